@@ -162,10 +162,10 @@ int start(int argc, const char* const* argv) {
 
 int main(int argc, char** argv) {
     using namespace cles::runtime;
-    set_up_signals();
     if (is_plugin_process(argc, argv)) {
         return run_plugin_process(argc, argv);
     }
+    set_up_signals();
     try {
         return start(argc, argv);
     } catch (const usage_error& e) {

@@ -330,7 +330,8 @@ def show_chain(chain, below):
         heading(f"A request over three links, asked at {CHAIN[0]}")
         show(f"> {question}\n< {json.dumps(link.ask(question), separators=(',', ':'))}")
 
-        heading(f"{SPREAD} jobs for {CHAIN[1]} by its name, asked at {CHAIN[0]}; its neighbours have free workers")
+    with Link(chain.urls[CHAIN[1]]) as link:
+        heading(f"{SPREAD} jobs at once, for {CHAIN[1]} by its name; its neighbours have free workers")
         before = jobs_done(link)
         fates, seconds, _, _ = run_jobs(link, SPREAD, below, target=CHAIN[1])
         shares = shares_of(before, jobs_done(link))

@@ -28,6 +28,7 @@ void add_hz(CLI::App& app, context& shared);
 void add_info(CLI::App& app, context& shared);
 void add_ls(CLI::App& app, context& shared);
 void add_top(CLI::App& app, context& shared);
+void add_trace(CLI::App& app, context& shared);
 void add_doctor(CLI::App& app, context& shared);
 void add_completion(CLI::App& app, context& shared);
 void add_serve(CLI::App& app, context& shared);

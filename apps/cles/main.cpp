@@ -91,6 +91,7 @@ int main(int argc, char** argv) {
         tool::add_info(app, shared);
         tool::add_ls(app, shared);
         tool::add_top(app, shared);
+        tool::add_trace(app, shared);
         tool::add_doctor(app, shared);
         tool::add_completion(app, shared);
         tool::add_serve(app, shared);

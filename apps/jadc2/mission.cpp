@@ -159,6 +159,15 @@ void mission::decide(const fmv::track& target) {
     boost::asio::co_spawn(io_, give(what, std::move(record)), boost::asio::detached);
 }
 
+// Not in the coroutine: g++ 12 warns about the allocation of its frame if that exceeds what Asio recycles.
+void mission::tell(const story& record) {
+    commander_.ended(record.fate);
+    const auto whom = record.fate == "done"
+                          ? " by " + record.struck_by + ", " + std::to_string(record.outcome.left) + " weapons left"
+                          : ": " + record.trouble;
+    events_.log("strike", "order " + record.order + " is " + record.fate + whom + to_text(record), record);
+}
+
 // Only once: people have to find out what happened to an order whose answer is lost.
 boost::asio::awaitable<void> mission::give(strike::order what, story record) {
     const auto options = cles::call_options{}.deadline(milliseconds{args_.deadline_ms}).urgent();
@@ -177,11 +186,7 @@ boost::asio::awaitable<void> mission::give(strike::order what, story record) {
         record.fate = fate_of(e);
         record.trouble = explain(e);
     }
-    commander_.ended(record.fate);
-    const auto whom = record.fate == "done"
-                          ? " by " + record.struck_by + ", " + std::to_string(record.outcome.left) + " weapons left"
-                          : ": " + record.trouble;
-    events_.log("strike", "order " + record.order + " is " + record.fate + whom + to_text(record), record);
+    tell(record);
     if (record.fate == "done" && !ending_) {
         co_await assess(record.outcome);
     }

@@ -47,6 +47,7 @@ class mission {
     boost::asio::awaitable<void> watch();
     boost::asio::awaitable<void> follow(cles::feed<picture> tracks);
     boost::asio::awaitable<void> read_orders();
+    void tell(const story& record);
     boost::asio::awaitable<void> give(strike::order what, story record);
     boost::asio::awaitable<void> assess(strike::outcome what);
     void see(picture what);

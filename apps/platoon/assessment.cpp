@@ -28,15 +28,23 @@ assessment::assessment(std::size_t vehicles, double spacing, double length) : sp
 }
 
 void assessment::sample(const std::vector<motion>& where) {
-    const auto errors = spacing_errors(where, spacing_);
-    result_.string_ratio = 0;
-    for (std::size_t i = 0; i < errors.size(); ++i) {
+    sample(where, std::vector<double>(where.size(), spacing_));
+}
+
+void assessment::sample(const std::vector<motion>& where, const std::vector<double>& desired) {
+    const bool complete = where.size() == result_.error.size() + 1;
+    result_.string_ratio = complete ? 0 : result_.string_ratio;
+    for (std::size_t i = 0; i + 1 < where.size(); ++i) {
+        const double distance = where[i].x - where[i + 1].x;
+        result_.least_gap = std::fmin(result_.least_gap, distance - length_);
+        if (!complete) {
+            continue;
+        }
         auto& most = result_.error[i];
-        most = std::max(most, std::abs(errors[i]));
+        most = std::max(most, std::abs(distance - desired[i + 1]));
         if (i > 0 && result_.error[i - 1] > 0) {
             result_.string_ratio = std::max(result_.string_ratio, most / result_.error[i - 1]);
         }
-        result_.least_gap = std::fmin(result_.least_gap, errors[i] + spacing_ - length_);
     }
     result_.collision = result_.least_gap <= 0;
 }

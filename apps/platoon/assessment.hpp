@@ -11,6 +11,9 @@
 
 namespace platoon {
 
+/// A string ratio up to this one counts as stable. It is above 1 because of the noise that losses add to the errors.
+inline constexpr double stable_ratio = 1.02;
+
 /// The result of a drive: `error[i]` is the largest error of the distance between vehicles i and i+1.
 struct verdict {
     std::vector<double> error{}; ///< m
@@ -25,8 +28,11 @@ class assessment {
   public:
     assessment(std::size_t vehicles, double spacing, double length);
 
-    /// Their positions, the leader first.
+    /// Their positions, the leader first, each at the same desired distance to the one ahead.
     void sample(const std::vector<motion>& where);
+    /// The same with a desired distance of each, of which the leader's does not count. If vehicles have joined or left,
+    /// only the gaps between those in the lane count.
+    void sample(const std::vector<motion>& where, const std::vector<double>& desired);
     [[nodiscard]] const verdict& result() const noexcept { return result_; }
 
   private:

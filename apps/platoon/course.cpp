@@ -9,9 +9,9 @@ namespace {
 
 constexpr double sample_step = 0.01, record_step = 0.05; // s: for the verdict, and for the record
 
-/// Each one's distance error to the vehicle that is ahead of it at that time, in the order of `where`.
-std::vector<double> errors_of(const std::vector<std::optional<motion>>& where, double spacing) {
-    std::vector<double> errors(where.size(), NAN);
+/// Each one's distance to the vehicle that is ahead of it at that time, in the order of `where`.
+std::vector<double> distances_of(const std::vector<std::optional<motion>>& where) {
+    std::vector<double> distances(where.size(), NAN);
     for (std::size_t i = 0; i < where.size(); ++i) {
         double ahead = INFINITY;
         for (std::size_t k = 0; k < where.size() && where[i]; ++k) {
@@ -20,10 +20,10 @@ std::vector<double> errors_of(const std::vector<std::optional<motion>>& where, d
             }
         }
         if (std::isfinite(ahead)) {
-            errors[i] = ahead - where[i]->x - spacing;
+            distances[i] = ahead - where[i]->x;
         }
     }
-    return errors;
+    return distances;
 }
 
 } // namespace
@@ -34,10 +34,21 @@ recording course_of(const logbook& book, const std::vector<std::string>& first, 
                   .vehicles = how.vehicles,
                   .hz = how.setup.hz,
                   .loss = how.loss,
+                  .burst = how.burst,
                   .delay_ms = how.delay * 1000,
                   .spacing = how.setup.spacing,
                   .seed = how.seed};
     assessment spacing_assessment{first.size(), how.setup.spacing, how.setup.limits.length};
+    const auto limits = limits_of(how.vehicles, how.differences, how.setup.limits, how.seed);
+    std::vector<double> desired;
+    std::size_t previous = 0;
+    for (std::size_t i = 0; i < how.vehicles; ++i) {
+        if (std::find(first.begin(), first.end(), name_of(i)) != first.end()) {
+            desired.push_back(
+                wanted_distance(how.setup.spacing, how.setup.plan.speed, limits[i].brake, limits[previous].brake));
+            previous = i;
+        }
+    }
     double least = NAN;
     for (long step = 0; static_cast<double>(step) * sample_step < end; ++step) {
         const double t = static_cast<double>(step) * sample_step;
@@ -56,7 +67,7 @@ recording course_of(const logbook& book, const std::vector<std::string>& first, 
             }
         }
         if (those_first.size() == first.size()) {
-            spacing_assessment.sample(those_first);
+            spacing_assessment.sample(those_first, desired);
         }
         least = std::fmin(least, least_gap(present, how.setup.limits.length));
         if (step % std::lround(record_step / sample_step) != 0) {
@@ -64,11 +75,11 @@ recording course_of(const logbook& book, const std::vector<std::string>& first, 
         }
         out.t.push_back(t);
         out.courses.resize(all.size());
-        const auto errors = errors_of(where, how.setup.spacing);
+        const auto distances = distances_of(where);
         for (std::size_t i = 0; i < all.size(); ++i) {
             out.courses[i].vehicle = all[i];
-            out.courses[i].speed.push_back(where[i] ? where[i]->v : NAN);
-            out.courses[i].error.push_back(errors[i]);
+            extend(out.courses[i], where[i].value_or(motion{.x = NAN, .v = NAN, .a = NAN}), distances[i],
+                   how.setup.spacing);
         }
     }
     out.verdict = spacing_assessment.result();

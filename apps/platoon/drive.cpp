@@ -7,7 +7,7 @@
 #include "client/member_key.hpp"
 #include "course.hpp"
 #include "laboratory_fleet.hpp"
-#include "simulation.hpp"
+#include "localization.hpp"
 #include "vehicle_node.hpp"
 #include "view.hpp"
 
@@ -37,6 +37,13 @@ constexpr auto poll_interval = 20ms;
 constexpr auto discovery_time = 400ms;
 constexpr double process_timeout = 10; // s
 
+/// With those that merge.
+std::size_t all_vehicles(const drive_options& options) {
+    return options.vehicles +
+           static_cast<std::size_t>(std::count_if(options.incidents.begin(), options.incidents.end(),
+                                                  [](const incident& e) { return e.what == incident::merge; }));
+}
+
 // In the folder of a fleet.
 std::string keys_of(const std::string& member, const std::string& fleet) {
     return (std::filesystem::path{fleet} / member).string();
@@ -53,7 +60,7 @@ void check_keys(const drive_options& options, const std::string& fleet) {
         }
     };
     check(operator_name);
-    for (std::size_t i = 0; i < options.vehicles; ++i) {
+    for (std::size_t i = 0; i < all_vehicles(options); ++i) {
         check(name_of(i));
     }
     if (!missing.empty()) {
@@ -80,8 +87,9 @@ class drive_supervisor {
   public:
     explicit drive_supervisor(const drive_options& options)
         : options_(options), signals_(io_, SIGINT, SIGTERM),
-          laboratory_(options.secured ? std::make_unique<laboratory_fleet>(options.vehicles) : nullptr),
-          keys_(laboratory_ ? laboratory_->folder() : options.keys), book_(options.setup.limits.lag),
+          laboratory_(options.secured ? std::make_unique<laboratory_fleet>(all_vehicles(options)) : nullptr),
+          keys_(laboratory_ ? laboratory_->folder() : options.keys),
+          limits_(limits_of(all_vehicles(options), options.differences, options.setup.limits, options.seed)),
           service_(io_, options_of(options, keys_)), open_(options.incidents) {
         signals_.async_wait([this](boost::system::error_code failed, int) { interrupted_ = !failed; });
     }
@@ -109,11 +117,11 @@ class drive_supervisor {
     [[nodiscard]] double now() const { return static_cast<double>(monotonic_ns() - start_ns_) * 1e-9; }
 
     asio::awaitable<void> hear() {
-        auto feed = co_await service_.async_bind<state>("all:state");
+        auto feed = co_await service_.async_bind<localization>("all:state");
         for (;;) {
             const auto item = co_await feed.async_next();
             if (item.has_value()) {
-                book_.add(item.publisher, item.value);
+                book_.add(item.publisher, to_state(item.value, start_utc_));
                 foreign_vehicle_ = children_.contains(item.publisher) ? foreign_vehicle_ : item.publisher;
             }
         }
@@ -128,10 +136,19 @@ class drive_supervisor {
         }
         const std::size_t n = options_.vehicles;
         start_ns_ = monotonic_ns() + 1'500'000'000 + 200'000'000 * static_cast<std::int64_t>(n);
+        start_utc_ = utc_at(start_ns_);
+        const double speed = options_.setup.plan.speed;
+        double x = 0;
+        std::size_t previous = 0;
         for (std::size_t i = 0; i < n; ++i) {
             if (!joins(i)) {
-                start(i, first_.empty() ? std::vector<std::string>{"--lead"}
-                                        : std::vector<std::string>{"--ahead", first_.back()});
+                x -= first_.empty()
+                         ? 0
+                         : wanted_distance(options_.setup.spacing, speed, limits_[i].brake, limits_[previous].brake);
+                previous = i;
+                start(i, x,
+                      first_.empty() ? std::vector<std::string>{"--lead"}
+                                     : std::vector<std::string>{"--ahead", first_.back()});
                 first_.push_back(name_of(i));
             }
         }
@@ -184,26 +201,33 @@ class drive_supervisor {
                            [i](const incident& e) { return e.what == incident::join && e.vehicle == i; });
     }
 
-    void start(std::size_t i, const std::vector<std::string>& role_options) {
+    void start(std::size_t i, double x, const std::vector<std::string>& role_options) {
         const auto& setup = options_.setup;
-        const auto place = start_position(first_.size(), setup.spacing, setup.plan.speed);
         std::vector<std::string> words{"vehicle", "--name", name_of(i), "--report"};
         words.insert(words.end(), role_options.begin(), role_options.end());
         const auto add = [&](const char* option, const auto& value) {
             words.emplace_back(option);
             words.push_back(std::to_string(value));
         };
-        add("--x", place.x);
+        add("--x", x);
         add("--turn", i);
-        add("--turns", options_.vehicles);
+        add("--turns", limits_.size());
         add("--start-ns", start_ns_);
+        add("--start-utc", start_utc_);
+        add("--lag", limits_[i].lag);
+        add("--brake", limits_[i].brake);
         add("--hz", setup.hz);
+        add("--brake-at", setup.plan.brake_at);
         add("--loss", options_.loss * 100);
+        add("--burst", options_.burst);
         add("--delay", options_.delay * 1000);
         add("--seed", options_.seed * 1000 + i);
         words.insert(words.end(), {"--controller", setup.uses_leader ? "leader" : "predecessor"});
         words.insert(words.end(), {"--multicast", options_.group.interface + "," + options_.group.group + ":" +
                                                       std::to_string(options_.group.port)});
+        if (!setup.radar.fitted) {
+            words.emplace_back("--no-radar");
+        }
         if (options_.insecure) {
             words.emplace_back("--insecure");
         }
@@ -222,20 +246,26 @@ class drive_supervisor {
             const auto name = name_of(e.vehicle);
             const auto who = children_.find(name);
             if (e.what == incident::join) {
-                start(e.vehicle, {"--join"});
+                start(e.vehicle, 0, {"--join"});
+            } else if (e.what == incident::merge) {
+                start(options_.vehicles + merged_++, 0, {"--behind", name});
             } else if (who != children_.end() && e.what == incident::vanish) {
                 who->second.signal(SIGKILL);
                 note(name, "killed", "as requested");
             } else if (who != children_.end()) {
-                service_.async_push(name + ":leave", cles::json_text{"{}"},
-                                    [this, name](boost::system::error_code failed, const cles::json_text&) {
-                                        if (failed) {
-                                            note(name, "stays", "the request to leave failed: " + failed.message());
-                                        }
-                                    });
+                ask(name, e.what == incident::split ? "split" : "leave");
             }
             return true;
         });
+    }
+
+    void ask(const std::string& name, const std::string& task) {
+        service_.async_push(name + ":" + task, cles::json_text{"{}"},
+                            [this, name, task](boost::system::error_code failed, const cles::json_text&) {
+                                if (failed) {
+                                    note(name, "stays", "the request to " + task + " failed: " + failed.message());
+                                }
+                            });
     }
 
     void check_children() {
@@ -320,8 +350,12 @@ class drive_supervisor {
             latencies.insert(latencies.end(), report.latency_us.begin(), report.latency_us.end());
         }
         std::sort(out.events.begin(), out.events.end(), [](const event& a, const event& b) { return a.t < b.t; });
-        out.fallbacks = static_cast<std::uint64_t>(
-            std::count_if(out.events.begin(), out.events.end(), [](const event& e) { return e.mode == "fallback"; }));
+        const auto count = [&out](const std::string& mode) {
+            return static_cast<std::uint64_t>(std::count_if(out.events.begin(), out.events.end(),
+                                                            [&mode](const event& e) { return e.mode == mode; }));
+        };
+        out.fallbacks = count("fallback");
+        out.radar_spells = count("radar");
         out.latency = summarise(std::move(latencies));
         return out;
     }
@@ -339,6 +373,8 @@ class drive_supervisor {
     asio::signal_set signals_;                     ///< before there are files that have to be removed in the end
     std::unique_ptr<laboratory_fleet> laboratory_; ///< if it was asked for
     std::string keys_;                             ///< the folder of the fleet; empty: without security
+    std::vector<vehicle_limits> limits_;           ///< of each vehicle
+    std::size_t merged_ = 0;                       ///< how many were started to merge
     logbook book_;
     cles::service service_;
     std::vector<incident> open_;
@@ -348,6 +384,7 @@ class drive_supervisor {
     std::string foreign_vehicle_;
     std::exception_ptr receive_failure_; ///< why updates are no longer received
     std::int64_t start_ns_ = 0;
+    double start_utc_ = 0;
     double end_ = 0;
     bool interrupted_ = false, disturbed_ = false;
 };

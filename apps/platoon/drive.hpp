@@ -4,7 +4,9 @@
 #include <cles/multicast.hpp>
 
 #include "driver.hpp"
+#include "incident.hpp"
 #include "recording.hpp"
+#include "simulation.hpp"
 
 #include <optional>
 #include <string>
@@ -12,17 +14,12 @@
 
 namespace platoon {
 
-/// What happens to a vehicle at a time of the drive.
-struct incident {
-    enum kind { vanish, join, leave } what = vanish;
-    std::size_t vehicle = 0;
-    double at = 0;
-};
-
 struct drive_options {
     std::size_t vehicles = 10;
     double seconds = 0; ///< 0: until five seconds after the leader's manoeuvre
     double loss = 0, delay = 0;
+    double burst = 0; ///< the mean number of updates of a burst of losses; 0: losses are independent
+    spread differences{};
     std::uint64_t seed = 1;
     driver_setup setup{}; ///< of each vehicle, without name, position and predecessor
     std::vector<incident> incidents{};

@@ -13,29 +13,63 @@ constexpr double lead_after = 0.5;       // s of fallback, after which this vehi
 constexpr double fallback_brake = 4;     // m/s², more than a vehicle without a driver
 constexpr double fallback_growth = 15;   // m/s² after 1 s, growing with the square: a late update changes little
 constexpr double fallback_jerk = 5;      // m/s³, if no update was ever received
-constexpr double fade_time = 0.5;        // s in which the weight of the leader fades out and in
+constexpr double fade_time = 1;          // s in which the weight of the leader fades out and in
 constexpr double close_up_speed = 1.5;   // m/s
 constexpr double distance_tolerance = 2; // m
+constexpr double cruise_gain = 0.5;      // 1/s
+constexpr double cruise_limit = 1;       // m/s²
+
+// With the radar alone.
+constexpr double radar_share_time = 0.8; // s, in which its estimate replaces the extrapolated update
+constexpr double hold_time = 3;          // s, after which the gap opens, and this vehicle leads those behind
+constexpr double full_time_gap = 1.5;    // s
+constexpr double standstill_gap = 5;     // m
+constexpr double open_speed = 3;         // m/s, at which the gap opens
+constexpr double least_time_gap = 0.5;   // s, in the gain: a smaller one would react to noise, faster than the vehicle
+constexpr double radar_gain = 0.4;       // 1/s
+constexpr double switch_time = 2;        // s, from the law for constant spacing to the one for a time gap
+constexpr double trust_after = 2; // s without a gap in the updates, after which the distance becomes smaller again
+
+// A merge.
+constexpr double merge_timeout = 60;  // s, for the vehicle that joins
+constexpr double in_lane_notice = 2;  // s, for which it is still named when it is in the lane
+constexpr double merge_tolerance = 2; // m, of the distances ahead and behind
+constexpr double merge_speed = 1.5;   // m/s, of the difference to the one ahead
+
+reference blend(const reference& from, const reference& to, double share) {
+    const auto between = [share](double a, double b) { return a + share * (b - a); };
+    return {.where = {.x = between(from.where.x, to.where.x),
+                      .v = between(from.where.v, to.where.v),
+                      .a = between(from.where.a, to.where.a)},
+            .command = between(from.command, to.command),
+            .distance = to.distance,
+            .lag_ratio = from.lag_ratio};
+}
 
 } // namespace
 
 driver::driver(driver_setup setup, double now)
     : setup_(std::move(setup)), self_(setup_.start), now_(now), began_(std::max(now, 0.0)), ahead_(setup_.ahead),
-      distance_(setup_.spacing) {
+      distance_(setup_.spacing), radar_(setup_.radar) {
     if (ahead_.empty()) {
         mode_ = role::lead;
         lead_ = setup_.name;
+    } else if (setup_.merges) {
+        mode_ = role::merge;
     }
 }
 
 std::set<std::string> driver::needed() const {
-    std::set<std::string> names{ahead_, next_, lead_};
+    std::set<std::string> names{ahead_, next_, lead_, admits_, makes_room_for_, setup_.before};
     std::erase_if(names, [this](const auto& name) { return !needs(name); });
     return names;
 }
 
 bool driver::needs(const std::string& name) const {
-    return name != setup_.name && !name.empty() && (name == ahead_ || name == lead_ || name == next_);
+    return !name.empty() &&
+           (name == ahead_ || name == lead_ || name == next_ || name == admits_ || name == makes_room_for_ ||
+            (mode_ == role::merge && name == setup_.before)) &&
+           name != setup_.name;
 }
 
 const track* driver::heard(const std::string& name) const {
@@ -59,16 +93,39 @@ void driver::enter(role mode, const std::string& why) {
 
 void driver::leave() { leaving_ = true; }
 
+void driver::admit(const std::string& name) {
+    admits_ = name;
+    admits_until_ = now_ + merge_timeout;
+}
+
+void driver::split() {
+    ahead_.clear();
+    next_.clear();
+    makes_room_for_.clear();
+    cruise_ = self_.v;
+    lead_those_behind();
+    enter(role::lead, "it splits off");
+}
+
+void driver::measure(const echo& seen, double now) {
+    radar_.measure(seen, advance(self_, command_, setup_.limits.lag, now - now_), now);
+}
+
 void driver::receive(const std::string& from, const state& heard_now, double now) {
     if (!needs(from)) {
         return;
     }
     bool anew = !tracks_.contains(from) || lead_ == setup_.name;
-    auto& who = tracks_.try_emplace(from, setup_.limits.lag).first->second;
+    auto& who = tracks_[from];
     who.receive(heard_now, now);
-    if (from == next_) {
-        ahead_ = next_;
+    const bool in_lane = who.last().mode != role::merge;
+    if (from == admits_ && in_lane && who.last().ahead == setup_.name) {
+        admits_until_ = std::min(admits_until_, now + in_lane_notice);
+    }
+    if (from == next_ || (from == makes_room_for_ && in_lane && who.last().ahead == ahead_)) {
+        ahead_ = from;
         next_.clear();
+        makes_room_for_.clear();
         anew = true;
     }
     if (from != ahead_) {
@@ -76,8 +133,9 @@ void driver::receive(const std::string& from, const state& heard_now, double now
     }
     if (anew) {
         const double measured = who.at(now).x - advance(self_, command_, setup_.limits.lag, now - now_).x;
-        distance_ = std::abs(measured - setup_.spacing) < distance_tolerance ? setup_.spacing : measured;
+        distance_ = std::abs(measured - wanted()) < distance_tolerance ? wanted() : measured;
     }
+    makes_room_for_ = mode_ == role::merge || who.last().admits == setup_.name ? "" : who.last().admits;
     choose_leader(who.last());
     if (who.last().mode == role::leave) {
         take_over(who.last());
@@ -90,7 +148,7 @@ void driver::take_over(const state& from) {
         ahead_.clear();
         lead_ = setup_.name;
         behind_ = 0;
-        setup_.plan = {.speed = self_.v, .slow = self_.v};
+        cruise_ = self_.v;
         enter(role::lead, "the leader leaves");
     }
 }
@@ -108,12 +166,21 @@ void driver::step(double now) {
     self_ = advance(self_, command_, setup_.limits.lag, dt);
     now_ = now;
     const double before = command_;
+    if (!admits_.empty() && now_ > admits_until_) {
+        admits_.clear();
+    }
     if (mode_ == role::lead) {
-        command_ = setup_.plan.command(now);
-    } else if (silent(ahead_)) {
+        lead(dt);
+    } else if (!silent(ahead_)) {
+        if (heard(ahead_) != nullptr) {
+            follow(dt);
+        }
+    } else if (mode_ == role::merge) { // in a lane of its own
+        command_ = 0;
+    } else if (radar_.sees(now_)) {
+        follow_by_radar(dt);
+    } else {
         fall_back(dt);
-    } else if (heard(ahead_) != nullptr) {
-        follow(dt);
     }
     command_ = std::clamp(command_, -setup_.limits.brake, setup_.limits.accelerate);
     if (dt > 0) {
@@ -121,41 +188,138 @@ void driver::step(double now) {
     }
 }
 
+void driver::lead(double dt) {
+    command_ = cruise_ ? std::clamp(cruise_gain * (*cruise_ - self_.v), -cruise_limit, cruise_limit)
+                       : setup_.plan.command(now_);
+    if (radar_.sees(now_)) {
+        command_ = std::min(command_, keep_time_gap(dt));
+    } else {
+        time_gap_.reset();
+    }
+}
+
 void driver::follow(double dt) {
-    close_up(dt);
+    if (mode_ == role::radar) {
+        radar_until_ = now_;
+        time_gap_.reset();
+    }
+    adjust_distance(dt);
     const auto mode_ahead = heard(ahead_)->last().mode;
     const bool broken = mode_ahead == role::fallback && lead_ != ahead_;
     const bool leader_silent = lead_ != ahead_ && silent(lead_);
-    if (lead_.empty() && leader_silent) {
+    const bool leader_counts = setup_.uses_leader && !leader_silent && !broken && heard(lead_) != nullptr;
+    if (mode_ == role::merge) {
+        if (has_room()) {
+            enter(role::follow, "it changes into the lane behind " + ahead_);
+        }
+    } else if (lead_.empty() && leader_silent) {
         enter(role::degraded, ahead_ + " ahead does not report the leader");
     } else if (leader_silent || broken) {
         enter(role::degraded, leader_silent ? "the leader " + lead_ + " is silent" : ahead_ + " ahead has fallen back");
     } else {
         enter(role::follow, "receives " + ahead_ + " and " + lead_);
     }
-    const bool counts = setup_.uses_leader && mode_ == role::follow && heard(lead_) != nullptr;
-    doubt_ = counts ? 0 : doubt_ + dt;
+    fade(leader_counts, dt);
+    command_ = law(reference_to(ahead_, distance_));
+}
+
+void driver::fade(bool leader_counts, double dt) {
+    doubt_ = leader_counts ? 0 : doubt_ + dt;
     const double left = 1 - std::pow(doubt_ / fade_time, 3); // so that a short interruption changes almost nothing
-    weight_ = counts ? std::min(1.0, weight_ + dt / fade_time) : std::clamp(left, 0.0, weight_);
-    command_ = law(setup_.uses_leader ? weight_ : 0);
+    weight_ = leader_counts ? std::min(1.0, weight_ + dt / fade_time) : std::clamp(left, 0.0, std::max(0.0, weight_));
 }
 
-double driver::law(double weight) const {
-    const auto reference_to = [this](const std::string& name, double distance) {
-        const auto* who = heard(name);
-        if (who == nullptr) {
-            return reference{};
-        }
-        return reference{who->at(now_), who->command_at(now_), distance};
-    };
-    return spacing_law(setup_.law, self_, reference_to(ahead_, distance_), reference_to(lead_, behind_),
-                       heard(lead_) == nullptr ? 0 : weight);
+reference driver::reference_to(const std::string& name, double distance) const {
+    const auto* who = heard(name);
+    if (who == nullptr) {
+        return {};
+    }
+    return {who->at(now_), who->command_at(now_), distance, setup_.limits.lag / who->last().lag};
 }
 
-void driver::close_up(double dt) {
+double driver::law(const reference& ahead) const {
+    const bool leads = !setup_.uses_leader || heard(lead_) == nullptr;
+    return spacing_law(setup_.law, self_, ahead, reference_to(lead_, behind_), leads ? 0 : weight_);
+}
+
+double driver::wanted() const {
+    const auto* who = heard(ahead_);
+    return who == nullptr ? setup_.spacing
+                          : wanted_distance(setup_.spacing, setup_.plan.speed, setup_.limits.brake, who->last().brake);
+}
+
+void driver::adjust_distance(double dt) {
     const double before = distance_;
-    distance_ = std::max(setup_.spacing, distance_ - close_up_speed * dt);
+    const double room = makes_room_for_.empty() ? 0 : setup_.spacing;
+    const double target = wanted() + room;
+    if (distance_ < target) {
+        distance_ = std::min(target, distance_ + close_up_speed * dt);
+    } else if (now_ - radar_until_ > trust_after) {
+        distance_ = std::max(target, distance_ - close_up_speed * dt);
+    }
     behind_ += distance_ - before;
+}
+
+bool driver::has_room() const {
+    const auto ahead = heard(ahead_)->at(now_);
+    if (std::abs(ahead.x - self_.x - wanted()) > merge_tolerance || std::abs(ahead.v - self_.v) > merge_speed) {
+        return false;
+    }
+    const auto* follower = heard(setup_.before);
+    if (setup_.before.empty()) {
+        return true;
+    }
+    return follower != nullptr && !silent(setup_.before) &&
+           self_.x - follower->at(now_).x > setup_.spacing - merge_tolerance;
+}
+
+void driver::follow_by_radar(double dt) {
+    if (mode_ != role::radar) {
+        radar_since_ = now_;
+        time_gap_.reset();
+        enter(role::radar, heard(ahead_) == nullptr ? ahead_ + " ahead was never received: only the radar sees it"
+                                                    : ahead_ + " ahead is silent: only the radar sees it");
+    }
+    fade(setup_.uses_leader && lead_ != ahead_ && !silent(lead_) && heard(lead_) != nullptr, dt);
+    const double since = now_ - radar_since_;
+    // At first as before, because most interruptions are short, and an update that has just become old is more exact.
+    auto seen = radar_.at(now_);
+    seen.x += setup_.limits.length;
+    reference ahead{.where = seen, .command = seen.a, .distance = distance_};
+    if (heard(ahead_) != nullptr) {
+        ahead = blend(reference_to(ahead_, distance_), ahead, std::min(1.0, since / radar_share_time));
+    }
+    command_ = law(ahead);
+    if (since > hold_time) {
+        lead_those_behind();
+        const double share = std::min(1.0, (since - hold_time) / switch_time);
+        command_ += share * (keep_time_gap(dt) - command_);
+        const double kept = setup_.limits.length + standstill_gap + *time_gap_ * self_.v;
+        distance_ += share * (kept - distance_);
+    }
+}
+
+double driver::keep_time_gap(double dt) {
+    const auto rear = radar_.at(now_);
+    const double gap = rear.x - self_.x;
+    const double pace = std::max(self_.v, standstill_gap);
+    if (!time_gap_) {
+        time_gap_ = std::clamp((gap - standstill_gap) / pace, 0.0, full_time_gap);
+    }
+    time_gap_ = std::min(full_time_gap, *time_gap_ + open_speed / pace * dt);
+    const double error = gap - standstill_gap - *time_gap_ * self_.v;
+    const double limited = std::clamp(error, -setup_.law.max_error, setup_.law.max_error);
+    // The smaller the gap, the more of the acceleration ahead is fed forward.
+    return (1 - *time_gap_ / full_time_gap) * rear.a +
+           (rear.v - self_.v + radar_gain * limited) / std::max(*time_gap_, least_time_gap);
+}
+
+void driver::lead_those_behind() {
+    if (lead_ != setup_.name) {
+        lead_ = setup_.name;
+        behind_ = 0;
+        weight_ = 0;
+    }
 }
 
 void driver::fall_back(double dt) {
@@ -166,16 +330,14 @@ void driver::fall_back(double dt) {
     }
     const double since = now_ - fallback_since_;
     if (heard(ahead_) != nullptr && since <= lead_after) { // the normal command, reduced more and more
-        const double as_before = law(weight_);
+        const double as_before = law(reference_to(ahead_, distance_));
         command_ = std::max(as_before - fallback_growth * since * since, std::min(as_before, -fallback_brake));
     } else {
         // If it already brakes harder, it continues, because the one ahead may too.
         command_ = std::min(command_, std::max(command_ - fallback_jerk * dt, -fallback_brake));
     }
-    if (since > lead_after && lead_ != setup_.name) {
-        lead_ = setup_.name;
-        behind_ = 0;
-        weight_ = 0;
+    if (since > lead_after) {
+        lead_those_behind();
     }
 }
 
@@ -183,13 +345,16 @@ state driver::report() const {
     return {.mode = leaving_ ? role::leave : mode_,
             .ahead = ahead_,
             .lead = lead_,
+            .admits = admits_,
             .behind = behind_,
             .t = now_,
             .x = self_.x,
             .v = self_.v,
             .a = self_.a,
             .u = command_,
-            .j = trend_};
+            .j = trend_,
+            .lag = setup_.limits.lag,
+            .brake = setup_.limits.brake};
 }
 
 } // namespace platoon

@@ -2,11 +2,13 @@
 #pragma once
 
 #include "manoeuvre.hpp"
+#include "radar_track.hpp"
 #include "spacing_law.hpp"
 #include "track.hpp"
 
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -15,19 +17,22 @@ namespace platoon {
 
 struct driver_setup {
     std::string name{};
-    std::string ahead{};     ///< the vehicle it follows; empty: it leads
-    double hz = 25;          ///< of updates, the same for all
-    double spacing = 15;     ///< m, from front to front
+    std::string ahead{};  ///< the vehicle it follows; empty: it leads
+    bool merges = false;  ///< it is in the next lane, and changes into the lane of the one ahead when there is a gap
+    std::string before{}; ///< if it merges: the vehicle that makes room behind it; empty: nobody follows the one ahead
+    double hz = 25;       ///< of updates, the same for all
+    double spacing = 15;  ///< m, from front to front
     bool uses_leader = true; ///< false: follows only the one ahead, for comparison
     motion start{};
     manoeuvre plan{}; ///< if it leads
     vehicle_limits limits{};
+    radar_setup radar{};
     gains law{};
 };
 
-/// Controls one vehicle: its inputs are the updates of others and the time; its outputs are its position and its own
-/// updates. It uses no clock and no network, so that the simulation and the process run the same code. Times are local,
-/// in seconds.
+/// Controls one vehicle: its inputs are the updates of others, what its radar sees, and the time; its outputs are its
+/// position and its own updates. It uses no clock and no network, so that the simulation and the process run the same
+/// code. Times are local, in seconds.
 class driver {
   public:
     /// After this many periods without an update a vehicle counts as silent: three are missed, and a quarter is the
@@ -43,8 +48,14 @@ class driver {
     void receive(const std::string& from, const state& heard, double now);
     /// Advances to this time with the present command, then computes the next one.
     void step(double now);
+    /// Processes what its radar saw. \param now the time of the last `step`, or a little later
+    void measure(const echo& seen, double now);
     /// From now on its updates announce that it leaves.
     void leave();
+    /// Its follower makes room for this vehicle, which merges behind this one.
+    void admit(const std::string& name);
+    /// It leads those behind it from now on, and falls back to a time gap behind the one ahead, which its radar sees.
+    void split();
 
     /// Its update, as of the last step.
     [[nodiscard]] state report() const;
@@ -52,16 +63,30 @@ class driver {
     [[nodiscard]] double command() const noexcept { return command_; }
     [[nodiscard]] role mode() const noexcept { return mode_; }
     [[nodiscard]] double now() const noexcept { return now_; }
+    [[nodiscard]] const vehicle_limits& limits() const noexcept { return setup_.limits; }
+    [[nodiscard]] const std::string& ahead() const noexcept { return ahead_; }
+    /// The vehicle that merges behind this one; empty: none.
+    [[nodiscard]] const std::string& admits() const noexcept { return admits_; }
+    /// To the one ahead, front to front.
+    [[nodiscard]] double desired_distance() const noexcept { return distance_; }
 
     /// Called when the mode changes, with the reason.
     std::function<void(double now, role mode, const std::string& why)> on_change{};
 
   private:
     void enter(role mode, const std::string& why);
+    void lead(double dt);
     void follow(double dt);
+    void follow_by_radar(double dt);
     void fall_back(double dt);
-    [[nodiscard]] double law(double weight) const;
-    void close_up(double dt);
+    void fade(bool leader_counts, double dt);
+    void lead_those_behind();
+    [[nodiscard]] double law(const reference& ahead) const;
+    [[nodiscard]] reference reference_to(const std::string& name, double distance) const;
+    [[nodiscard]] double keep_time_gap(double dt);
+    [[nodiscard]] bool has_room() const;
+    [[nodiscard]] double wanted() const;
+    void adjust_distance(double dt);
     void take_over(const state& from);
     void choose_leader(const state& of_ahead);
     [[nodiscard]] bool silent(const std::string& name) const;
@@ -74,11 +99,18 @@ class driver {
     role mode_ = role::follow;
     bool leaving_ = false;
     std::string ahead_, next_, lead_; ///< `next_`: the one ahead after the present one has left
-    double distance_;                 ///< desired distance to the one ahead, which slowly approaches `setup.spacing`
+    std::string admits_;              ///< the vehicle that merges behind this one ...
+    double admits_until_ = 0;         ///< ... and when it is given up, or is in the lane
+    std::string makes_room_for_;      ///< the vehicle that merges ahead of this one
+    double distance_;                 ///< desired distance to the one ahead, which slowly approaches `wanted`
     double behind_ = 0;               ///< desired distance to the leader
     double weight_ = 0;               ///< of the leader
     double doubt_ = 0;                ///< s, for which it has not counted
     double fallback_since_ = 0;
+    double radar_since_ = 0, radar_until_ = -1e9;
+    std::optional<double> time_gap_; ///< s, that it keeps by radar at present
+    std::optional<double> cruise_;   ///< m/s, if it leads without a plan
+    radar_track radar_;
     std::map<std::string, track> tracks_;
 };
 

@@ -11,7 +11,7 @@ inline constexpr const char* operator_name = "operator";
 
 /// A fleet for one drive on this host: the keys of `operator` and each vehicle, in a temporary folder that only this
 /// user can read. A vehicle may receive the states of others, and join behind one; the operator may receive states, and
-/// make a vehicle leave; neither may do anything else.
+/// make a vehicle leave or split off; neither may do anything else.
 class laboratory_fleet {
   public:
     /// \throws tool::usage_error if this program was built without security

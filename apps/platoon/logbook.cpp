@@ -49,6 +49,9 @@ std::optional<motion> logbook::position(const std::string& vehicle, double t) co
     const auto& all = found->second;
     const auto next = std::upper_bound(all.begin(), all.end(), t, [](double at, const state& s) { return at < s.t; });
     const auto& before = *(next - 1);
+    if (before.mode == role::merge) {
+        return std::nullopt;
+    }
     if (next != all.end()) {
         return between(before, *next, t);
     }
@@ -56,7 +59,8 @@ std::optional<motion> logbook::position(const std::string& vehicle, double t) co
     if (end != ended_.end() && end->second) {
         return std::nullopt;
     }
-    return advance(before.position(), end != ended_.end() ? failsafe_command(before.u) : before.u, lag_, t - before.t);
+    return advance(before.position(), end != ended_.end() ? failsafe_command(before.u) : before.u, before.lag,
+                   t - before.t);
 }
 
 } // namespace platoon

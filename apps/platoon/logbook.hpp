@@ -14,12 +14,10 @@ namespace platoon {
 /// The updates of each vehicle during a drive, and therefore its position at any time.
 class logbook {
   public:
-    explicit logbook(double lag) : lag_(lag) {}
-
     void add(const std::string& vehicle, const state& told);
     /// Its process has ended. \param left as planned: it is no longer on the lane; otherwise it stays there, and brakes
     void record_end(const std::string& vehicle, bool left);
-    /// Nothing before its first update and after it has left.
+    /// Nothing before its first update, while it is in the next lane, and after it has left.
     [[nodiscard]] std::optional<motion> position(const std::string& vehicle, double t) const;
     /// Its last update, or null.
     [[nodiscard]] const state* last(const std::string& vehicle) const;
@@ -27,7 +25,6 @@ class logbook {
     [[nodiscard]] bool has_left(const std::string& vehicle) const;
 
   private:
-    double lag_;
     std::map<std::string, std::vector<state>> states_; ///< of each, in the order of time
     std::map<std::string, bool> ended_;                ///< whether by leaving
 };

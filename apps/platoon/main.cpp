@@ -21,23 +21,54 @@ namespace {
 /// The arguments of all commands.
 struct arguments {
     std::size_t vehicles = 0;
-    double hz = 25, seconds = 0, loss_percent = 0, delay_ms = 0;
-    std::uint64_t seed = 1;
+    double hz = 25, seconds = 0, loss_percent = 0, burst = 0, delay_ms = 0;
+    std::vector<double> lags{}, brakes{};
+    double brake_at = platoon::manoeuvre{}.brake_at;
+    double lag = platoon::vehicle_limits{}.lag, brake = platoon::vehicle_limits{}.brake;
+    std::uint64_t seed = 1, first_seed = 1;
     unsigned seeds = 1;
-    std::string controller = "leader", group{}, record{}, vanish{};
-    std::vector<std::string> vanishes{}, joins{}, leaves{};
-    bool json = false, view = false, lead = false, join = false, report = false, insecure = false, secured = false;
+    std::string controller = "leader", group{}, record{};
+    std::vector<std::string> vanishes{}, mutes{}, joins{}, leaves{}, merges{}, splits{};
+    bool json = false, view = false, lead = false, join = false, report = false, insecure = false, secured = false,
+         no_radar = false;
     tool::keys_option keys{}; // of a vehicle
     std::string fleet{};
-    std::string name{}, ahead{};
+    std::string name{}, ahead{}, behind{};
     double x = 0;
     std::size_t turn = 0, turns = 1;
     std::int64_t start_ns = 0;
+    double start_utc = 0;
 
     [[nodiscard]] platoon::driver_setup setup() const {
-        platoon::driver_setup setup{.hz = hz, .uses_leader = controller == "leader"};
-        return setup;
+        return {.hz = hz,
+                .uses_leader = controller == "leader",
+                .plan = {.brake_at = brake_at},
+                .radar = {.fitted = !no_radar},
+                .law = platoon::gains_for(hz)};
     }
+    [[nodiscard]] platoon::gilbert_elliott losses() const {
+        const double loss = loss_percent / 100;
+        if (burst > 0 && (loss >= 1 || burst < platoon::gilbert_elliott::shortest(loss))) {
+            throw tool::usage_error("--burst: at this loss, bursts have at least loss / (1 - loss) updates on average");
+        }
+        return platoon::losses_of(loss, burst);
+    }
+    [[nodiscard]] platoon::spread differences() const {
+        platoon::spread out;
+        if (!lags.empty()) {
+            out.least_lag = lags.front();
+            out.most_lag = lags.back();
+        }
+        if (!brakes.empty()) {
+            out.least_brake = brakes.front();
+            out.most_brake = brakes.back();
+        }
+        if (out.least_lag > out.most_lag || out.least_brake > out.most_brake) {
+            throw tool::usage_error("--lags and --brakes: write the lower limit first");
+        }
+        return out;
+    }
+    [[nodiscard]] std::vector<platoon::incident> incidents(std::size_t all_vehicles) const;
     [[nodiscard]] cles::multicast_options group_options() const {
         const char* variable = std::getenv("CLES_MULTICAST");
         const bool in_environment = variable != nullptr && *variable != '\0';
@@ -49,6 +80,8 @@ struct arguments {
     }
 };
 
+using platoon::simulate_command;
+using platoon::tune_command;
 using tool::usage_error;
 
 platoon::incident incident_of(platoon::incident::kind what, const std::string& text, std::size_t vehicles) {
@@ -58,53 +91,73 @@ platoon::incident incident_of(platoon::incident::kind what, const std::string& t
     const bool numbered = end != text.c_str() && *end == '@';
     const char* const at = end + (numbered ? 1 : 0);
     out.at = numbered ? std::strtod(at, &end) : -1;
-    if (!numbered || end == at || *end != '\0' || !(out.at >= 0 && out.at <= 3600)) {
+    bool valid = numbered && end != at && out.at >= 0 && out.at <= 3600;
+    if (valid && what == platoon::incident::mute && *end == '+') {
+        const char* const lasts = end + 1;
+        out.lasts = std::strtod(lasts, &end);
+        valid = end != lasts && out.lasts > 0;
+    }
+    if (!valid || *end != '\0') {
         throw usage_error("'" + text + "': write the number of a vehicle and a time, as in 3@12.5");
     }
     if (out.vehicle >= vehicles) {
         throw usage_error("'" + text + "': the vehicles are 0 to " + std::to_string(vehicles - 1));
     }
-    if (out.vehicle == 0 && what == platoon::incident::join) {
-        throw usage_error("'" + text + "': vehicle 0 leads, and cannot join");
+    if (out.vehicle == 0 && (what == platoon::incident::join || what == platoon::incident::split)) {
+        throw usage_error("'" + text + "': vehicle 0 leads, and can neither join nor split off");
     }
     return out;
 }
 
-int simulate(const arguments& args) {
-    platoon::scenario what{.vehicles = args.vehicles != 0 ? args.vehicles : 20,
-                           .seconds = args.seconds,
-                           .loss = args.loss_percent / 100,
-                           .delay = args.delay_ms / 1000,
-                           .setup = args.setup()};
-    if (!args.vanish.empty()) {
-        const auto which = incident_of(platoon::incident::vanish, args.vanish, what.vehicles);
-        what.vanish = static_cast<std::ptrdiff_t>(which.vehicle);
-        what.vanish_at = which.at;
+std::vector<platoon::incident> arguments::incidents(std::size_t all_vehicles) const {
+    std::vector<platoon::incident> all;
+    const auto add = [&](platoon::incident::kind what, const std::vector<std::string>& texts) {
+        for (const auto& text : texts) {
+            all.push_back(incident_of(what, text, all_vehicles));
+        }
+    };
+    add(platoon::incident::mute, mutes);
+    add(platoon::incident::vanish, vanishes);
+    add(platoon::incident::join, joins);
+    add(platoon::incident::merge, merges);
+    add(platoon::incident::split, splits);
+    add(platoon::incident::leave, leaves);
+    if (no_radar && !splits.empty()) {
+        throw tool::usage_error("--split: vehicles that split off keep their distance by radar");
     }
-    return simulate_command(what, args.seeds, args.json, args.record);
+    return all;
+}
+
+platoon::scenario scenario_of(const arguments& args) {
+    const std::size_t vehicles = args.vehicles != 0 ? args.vehicles : 20;
+    return {.vehicles = vehicles,
+            .seconds = args.seconds,
+            .losses = args.losses(),
+            .delay = args.delay_ms / 1000,
+            .seed = args.first_seed,
+            .incidents = args.incidents(vehicles),
+            .differences = args.differences(),
+            .setup = args.setup()};
 }
 
 int run(const arguments& args) {
-    platoon::drive_options options{.vehicles = args.vehicles != 0 ? args.vehicles : 10,
+    const std::size_t vehicles = args.vehicles != 0 ? args.vehicles : 10;
+    const auto losses = args.losses(); // checks them
+    platoon::drive_options options{.vehicles = vehicles,
                                    .seconds = args.seconds,
-                                   .loss = args.loss_percent / 100,
+                                   .loss = losses.mean_loss(),
                                    .delay = args.delay_ms / 1000,
+                                   .burst = args.burst,
+                                   .differences = args.differences(),
                                    .seed = args.seed,
                                    .setup = args.setup(),
+                                   .incidents = args.incidents(vehicles),
                                    .group = args.group_options(),
                                    .insecure = args.insecure,
                                    .keys = args.fleet,
                                    .secured = args.secured,
                                    .quiet = args.json,
                                    .in_place = !args.json && (args.view || ::isatty(STDOUT_FILENO) == 1)};
-    const auto add = [&](platoon::incident::kind what, const std::vector<std::string>& texts) {
-        for (const auto& text : texts) {
-            options.incidents.push_back(incident_of(what, text, options.vehicles));
-        }
-    };
-    add(platoon::incident::vanish, args.vanishes);
-    add(platoon::incident::join, args.joins);
-    add(platoon::incident::leave, args.leaves);
     if (!args.record.empty()) {
         platoon::check_writable(args.record); // before a drive of minutes
     }
@@ -121,11 +174,13 @@ int run(const arguments& args) {
 int vehicle(const arguments& args) {
     platoon::vehicle_options options{.setup = args.setup(),
                                      .joins = !args.lead && args.ahead.empty(),
+                                     .behind = args.behind,
                                      .turn = args.turn,
                                      .turns = args.turns,
                                      .start_ns = args.start_ns,
+                                     .start_utc = args.start_utc,
                                      .seconds = args.seconds,
-                                     .loss = args.loss_percent / 100,
+                                     .losses = args.losses(),
                                      .delay = args.delay_ms / 1000,
                                      .seed = args.seed,
                                      .group = args.group_options(),
@@ -137,8 +192,13 @@ int vehicle(const arguments& args) {
     options.setup.name = args.name.empty() ? tool::name_of_member(options.keys) : args.name;
     options.setup.ahead = args.ahead;
     options.setup.start = {args.x, options.setup.plan.speed, 0};
+    options.setup.limits.lag = args.lag;
+    options.setup.limits.brake = args.brake;
     if (options.start_ns == 0) {
         options.start_ns = platoon::monotonic_ns();
+    }
+    if (options.start_utc == 0) {
+        options.start_utc = platoon::utc_at(options.start_ns);
     }
     const auto report = platoon::vehicle_node{std::move(options)}.run();
     if (args.report) {
@@ -153,10 +213,39 @@ void add_common(CLI::App& command, arguments& args) {
         ->check(CLI::Range(1.0, 600.0));
     command.add_option("--loss", args.loss_percent, "Updates that each receiver loses, in percent (0)")
         ->check(CLI::Range(0.0, 100.0));
+    command
+        .add_option("--burst", args.burst,
+                    "Updates are lost in bursts, with this mean number of updates (independently)")
+        ->check(CLI::Range(0.0, 1000.0));
+    command.add_flag("--no-radar", args.no_radar, "Vehicles have no radar: without updates they see nothing");
     command.add_option("--delay", args.delay_ms, "Delay of updates in ms: at least half of it, at most all of it (0)")
         ->check(CLI::Range(0.0, 1000.0));
+    command.add_option("--brake-at", args.brake_at, "The leader brakes at T (5)")
+        ->check(CLI::Range(0.0, 3600.0))
+        ->type_name("T");
     command.add_option("--controller", args.controller, "Follow the leader too, or only the predecessor")
         ->check(CLI::IsMember({"leader", "predecessor"}));
+}
+
+void add_differences(CLI::App& command, arguments& args) {
+    command.add_option("--lags", args.lags, "Engines and brakes lag by LOW to HIGH seconds (0.3)")
+        ->expected(2)
+        ->check(CLI::Range(0.05, 2.0));
+    command.add_option("--brakes", args.brakes, "Vehicles brake with at most LOW to HIGH m/s² (8)")
+        ->expected(2)
+        ->check(CLI::Range(1.0, 12.0));
+    command.add_option("--vanish", args.vanishes, "The process of vehicle I is killed at T")->type_name("I@T");
+    command.add_option("--merge", args.merges, "A further vehicle merges behind vehicle I at T")->type_name("I@T");
+    command.add_option("--split", args.splits, "Vehicle I and those behind split off at T")->type_name("I@T");
+    command.add_option("--leave", args.leaves, "Vehicle I leaves at T")->type_name("I@T");
+}
+
+void add_seeds(CLI::App& command, arguments& args) {
+    command.add_option("-n,--vehicles", args.vehicles, "Number of vehicles (20)")->check(CLI::Range(2, 100));
+    command.add_option("--seeds", args.seeds, "Number of drives, each with its own losses (1)")
+        ->check(CLI::Range(1, 100'000));
+    command.add_option("--mute", args.mutes, "Vehicle I sends nothing from T on, for D seconds")->type_name("I@T[+D]");
+    command.add_option("--first-seed", args.first_seed, "Seed of the first of them (1)");
 }
 
 void add_group(CLI::App& command, arguments& args) {
@@ -169,7 +258,10 @@ void add_group(CLI::App& command, arguments& args) {
 
 int dispatch(const CLI::App& app, const arguments& args) {
     if (app.got_subcommand("simulate")) {
-        return simulate(args);
+        return simulate_command(scenario_of(args), args.seeds, args.json, args.record);
+    }
+    if (app.got_subcommand("tune")) {
+        return tune_command(scenario_of(args), args.seeds);
     }
     return app.got_subcommand("run") ? run(args) : vehicle(args);
 }
@@ -182,20 +274,21 @@ int main(int argc, char** argv) {
     app.require_subcommand(1);
     app.footer("Exit codes: 0 ok, 1 a collision, 2 usage, 3 no vehicle or no multicast, 5 another error, 6 busy.");
     auto& in_time = *app.add_subcommand("simulate", "Simulate a drive in virtual time, without a network");
+    auto& search = *app.add_subcommand("tune", "Search the gains of the controller, in virtual time");
     auto& on_road = *app.add_subcommand("run", "Run a drive, with a process for each vehicle");
     auto& one = *app.add_subcommand("vehicle", "Run one vehicle: lead, follow, or join a platoon");
-    for (auto* command : {&in_time, &on_road, &one}) {
+    for (auto* command : {&in_time, &search, &on_road, &one}) {
         add_common(*command, args);
     }
-    in_time.add_option("-n,--vehicles", args.vehicles, "Number of vehicles (20)")->check(CLI::Range(2, 100));
-    in_time.add_option("--seeds", args.seeds, "Number of drives, each with its own losses (1)")
-        ->check(CLI::Range(1, 1000));
-    in_time.add_option("--vanish", args.vanish, "Vehicle I stops sending at T")->type_name("I@T");
+    for (auto* command : {&in_time, &search, &on_road}) {
+        add_differences(*command, args);
+    }
+    for (auto* command : {&in_time, &search}) {
+        add_seeds(*command, args);
+    }
     on_road.add_option("-n,--vehicles", args.vehicles, "Number of vehicles (10)")->check(CLI::Range(2, 50));
     on_road.add_option("--seed", args.seed, "Seed of the losses (1)");
-    on_road.add_option("--vanish", args.vanishes, "The process of vehicle I is killed at T")->type_name("I@T");
     on_road.add_option("--join", args.joins, "Vehicle I joins the end of the platoon at T")->type_name("I@T");
-    on_road.add_option("--leave", args.leaves, "Vehicle I leaves at T")->type_name("I@T");
     // Not from CLES_KEYS, which names the directory of one member.
     on_road
         .add_option("-k,--keys", args.fleet, "A fleet's folder with the keys of operator, v0, v1 ...: all is sealed")
@@ -215,10 +308,17 @@ int main(int argc, char** argv) {
     auto* const lead = one.add_flag("--lead", args.lead, "Lead the platoon");
     auto* const ahead = one.add_option("--ahead", args.ahead, "The vehicle to follow")->excludes(lead);
     one.add_flag("--join", args.join, "Join the platoon in the group (default)")->excludes(lead)->excludes(ahead);
+    one.add_option("--behind", args.behind, "Merge behind this vehicle, in the middle of the platoon")
+        ->excludes(lead)
+        ->excludes(ahead);
+    one.add_option("--lag", args.lag, "The lag of engine and brakes, s (0.3)")->check(CLI::Range(0.05, 2.0));
+    one.add_option("--brake", args.brake, "The maximum deceleration, m/s² (8)")->check(CLI::Range(1.0, 12.0));
     one.add_option("--x", args.x, "Position at the start, m");
     one.add_option("--turn", args.turn, "The slot of a period in which it sends ...");
     one.add_option("--turns", args.turns, "... of this number of slots")->check(CLI::Range(1, 1000));
     one.add_option("--start-ns", args.start_ns, "The start, by CLOCK_MONOTONIC (default: now)");
+    one.add_option("--start-utc", args.start_utc,
+                   "The same in UTC, seconds since 1970 (default: by this host's clock)");
     one.add_option("--seed", args.seed, "Seed of the losses (1)");
     one.add_flag("--report", args.report, "Print the report of its recorder at the end");
     try {

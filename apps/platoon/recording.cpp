@@ -4,6 +4,8 @@
 #include <cles/convert.hpp>
 #include <cles/error.hpp>
 
+#include "localization.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -21,6 +23,16 @@ constexpr double budget_us = 100'000;
 }
 
 } // namespace
+
+void extend(course& of, const motion& where, double distance, double spacing) {
+    const auto place = std::isnan(where.x) ? geographic{.lat = NAN, .lon = NAN} : place_on_road(where.x);
+    of.speed.push_back(where.v);
+    of.error.push_back(distance - spacing);
+    of.distance.push_back(distance);
+    of.place.push_back(where.x);
+    of.lat.push_back(place.lat);
+    of.lon.push_back(place.lon);
+}
 
 latency_summary summarise(std::vector<double> latencies_us) {
     latency_summary out{.count = latencies_us.size()};
@@ -52,6 +64,9 @@ std::string summary_of(const recording& drive) {
     };
     add(std::snprintf(line.data(), line.size(), "platoon   %zu vehicles at %g Hz, %g %% lost, up to %g ms late\n",
                       drive.vehicles, drive.hz, drive.loss * 100, drive.delay_ms));
+    if (drive.burst > 0) {
+        add(std::snprintf(line.data(), line.size(), "losses    in bursts of %g updates on average\n", drive.burst));
+    }
     if (drive.steady && !std::isnan(v.least_gap)) {
         const auto most = std::max_element(v.error.begin(), v.error.end());
         add(std::snprintf(line.data(), line.size(), "spacing   %.3f m off at most, behind v%td; string ratio %.4f\n",
@@ -63,6 +78,8 @@ std::string summary_of(const recording& drive) {
         add(std::snprintf(line.data(), line.size(), "gap       %.3f m at least%s\n", v.least_gap,
                           v.collision ? ": A COLLISION" : ""));
     }
+    add(std::snprintf(line.data(), line.size(), "radar     %ju times alone because updates were missing\n",
+                      std::uintmax_t{drive.radar_spells}));
     add(std::snprintf(line.data(), line.size(), "fallback  %ju times because updates were missing\n",
                       std::uintmax_t{drive.fallbacks}));
     if (drive.latency.count != 0) {

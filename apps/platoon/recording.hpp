@@ -2,6 +2,7 @@
 #pragma once
 
 #include "assessment.hpp"
+#include "motion.hpp"
 
 #include <boost/describe/class.hpp>
 
@@ -36,8 +37,14 @@ BOOST_DESCRIBE_STRUCT(vehicle_report, (), (vehicle, sent, received, lost, missed
 struct course {
     std::string vehicle{};
     std::vector<double> speed{}, error{}; ///< m/s; m, of the distance to the one ahead (the leader has none)
+    std::vector<double> distance{};       ///< to the one ahead in the lane, front to front, m
+    std::vector<double> place{};          ///< along the road, m
+    std::vector<double> lat{}, lon{};     ///< degrees
 };
-BOOST_DESCRIBE_STRUCT(course, (), (vehicle, speed, error))
+BOOST_DESCRIBE_STRUCT(course, (), (vehicle, speed, error, distance, place, lat, lon))
+
+/// Adds a moment to it; all are NaN where the vehicle is not there. \param spacing the desired distance
+void extend(course& of, const motion& where, double distance, double spacing);
 
 /// The latencies of updates, in microseconds.
 struct latency_summary {
@@ -54,12 +61,13 @@ latency_summary summarise(std::vector<double> latencies_us);
 struct recording {
     std::string source{};
     std::size_t vehicles = 0;
-    double hz = 0, loss = 0, delay_ms = 0, spacing = 0;
+    double hz = 0, loss = 0, burst = 0, delay_ms = 0, spacing = 0; ///< burst: updates, on average; 0: independent
     std::uint64_t seed = 0;
     bool steady =
         true; ///< no vehicle joined, left or vanished, so that `verdict.error` and `string_ratio` are meaningful
     struct verdict verdict {};
-    std::uint64_t fallbacks = 0; ///< how often a vehicle fell back because updates were missing
+    std::uint64_t fallbacks = 0;    ///< how often a vehicle fell back because updates were missing
+    std::uint64_t radar_spells = 0; ///< how often one followed by its radar alone because updates were missing
     std::uint64_t sent = 0, received = 0, lost = 0, missed = 0;
     latency_summary latency{};
     std::vector<event> events{};
@@ -67,8 +75,8 @@ struct recording {
     std::vector<course> courses{};
 };
 BOOST_DESCRIBE_STRUCT(recording, (),
-                      (source, vehicles, hz, loss, delay_ms, spacing, seed, steady, verdict, fallbacks, sent, received,
-                       lost, missed, latency, events, t, courses))
+                      (source, vehicles, hz, loss, burst, delay_ms, spacing, seed, steady, verdict, fallbacks,
+                       radar_spells, sent, received, lost, missed, latency, events, t, courses))
 
 /// A few lines of text.
 std::string summary_of(const recording& drive);

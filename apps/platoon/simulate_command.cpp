@@ -3,6 +3,8 @@
 
 #include <cles/convert.hpp>
 
+#include "wilson.hpp"
+
 #include <boost/describe/enum_to_string.hpp>
 
 #include <algorithm>
@@ -15,80 +17,133 @@ namespace {
 /// The results of all seeds.
 struct outcome {
     std::size_t vehicles = 0;
-    double hz = 0, loss = 0, delay_ms = 0;
+    double hz = 0, loss = 0, burst = 0, delay_ms = 0;
     std::string controller{};
-    double string_ratio = 0; ///< the largest
-    double least_gap = 0;
+    bool radar = false;
+    std::uint64_t first_seed = 0, seeds = 0;
+    double string_ratio = 0;                                    ///< the largest
+    double stable_ratio = 0;                                    ///< above it, a drive counts as unstable
+    std::uint64_t unstable = 0;                                 ///< drives
+    double failure_rate = 0, failure_low = 0, failure_high = 0; ///< of string stability, with its 95 % interval
+    std::uint64_t collisions = 0;                               ///< drives
+    double collision_low = 0, collision_high = 0;
+    double least_gap = INFINITY;
     bool collision = false;
-    double fallbacks = 0; ///< of one drive, on average
+    double fallbacks = 0;    ///< of one drive, on average
+    double radar_spells = 0; ///< how often a vehicle followed by its radar alone, in one drive, on average
     std::vector<verdict> runs{};
 };
 BOOST_DESCRIBE_STRUCT(outcome, (),
-                      (vehicles, hz, loss, delay_ms, controller, string_ratio, least_gap, collision, fallbacks, runs))
+                      (vehicles, hz, loss, burst, delay_ms, controller, radar, first_seed, seeds, string_ratio,
+                       stable_ratio, unstable, failure_rate, failure_low, failure_high, collisions, collision_low,
+                       collision_high, least_gap, collision, fallbacks, radar_spells, runs))
 
-recording record_of(scenario what) {
+/// Whether errors behind a vehicle may be compared with those ahead of it: the platoon stays the same.
+bool is_steady(const scenario& what) { return what.incidents.empty(); }
+
+recording record_of(scenario what, bool with_courses) {
     recording out{.source = "simulated",
                   .vehicles = what.vehicles,
                   .hz = what.setup.hz,
-                  .loss = what.loss,
+                  .loss = what.losses.mean_loss(),
+                  .burst = what.losses.to_good > 0 ? 1 / what.losses.to_good : 0,
                   .delay_ms = what.delay * 1000,
                   .spacing = what.setup.spacing,
                   .seed = what.seed,
-                  .steady = what.vanish < 0};
+                  .steady = is_steady(what)};
     what.on_change = [&](double t, const std::string& vehicle, role mode, const std::string& why) {
-        out.events.push_back({t, vehicle, boost::describe::enum_to_string(mode, ""), why});
+        if (with_courses) {
+            out.events.push_back({t, vehicle, boost::describe::enum_to_string(mode, ""), why});
+        }
         out.fallbacks += mode == role::fallback ? 1 : 0;
+        out.radar_spells += mode == role::radar ? 1 : 0;
     };
-    for (std::size_t i = 0; i < what.vehicles; ++i) {
-        out.courses.push_back({.vehicle = name_of(i)});
+    if (!with_courses) {
+        out.verdict = simulate(what);
+        return out;
     }
     long looks = 0;
-    out.verdict = simulate(what, [&](double now, const std::vector<motion>& where) {
+    out.verdict = simulate(what, [&](double now, const std::vector<sighting>& all) {
         if (looks++ % 5 != 0) {
             return;
         }
+        while (out.courses.size() < all.size()) { // it has joined
+            course joined{.vehicle = name_of(out.courses.size())};
+            for (std::size_t i = 0; i < out.t.size(); ++i) {
+                extend(joined, {.x = NAN, .v = NAN, .a = NAN}, NAN, NAN);
+            }
+            out.courses.push_back(std::move(joined));
+        }
         out.t.push_back(now);
-        const auto errors = spacing_errors(where, what.setup.spacing);
-        for (std::size_t i = 0; i < where.size(); ++i) {
-            out.courses[i].speed.push_back(where[i].v);
-            out.courses[i].error.push_back(i == 0 ? NAN : errors[i - 1]);
+        for (std::size_t i = 0; i < all.size(); ++i) {
+            extend(out.courses[i], all[i].where, all[i].distance, all[i].desired);
         }
     });
     return out;
 }
+
+void print_all(const outcome& all) {
+    std::printf("all       string ratio %.4f at most, gap %.3f m at least\n", all.string_ratio, all.least_gap);
+    std::printf("failures  %ju of %ju drives above a string ratio of %g: %.2f %% (95 %% interval %.2f to %.2f %%)\n",
+                std::uintmax_t{all.unstable}, std::uintmax_t{all.seeds}, all.stable_ratio, all.failure_rate * 100,
+                all.failure_low * 100, all.failure_high * 100);
+    std::printf("collided  %ju of %ju drives (95 %% interval %.2f to %.2f %%)\n", std::uintmax_t{all.collisions},
+                std::uintmax_t{all.seeds}, all.collision_low * 100, all.collision_high * 100);
+    std::printf("in each   %.2f fallbacks, %.2f spells with the radar alone, on average\n", all.fallbacks,
+                all.radar_spells);
+}
+
+constexpr unsigned most_lines = 20;
 
 } // namespace
 
 int simulate_command(scenario what, unsigned seeds, bool json, const std::string& record) {
     outcome all{.vehicles = what.vehicles,
                 .hz = what.setup.hz,
-                .loss = what.loss,
+                .loss = what.losses.mean_loss(),
+                .burst = what.losses.to_good > 0 ? 1 / what.losses.to_good : 0,
                 .delay_ms = what.delay * 1000,
                 .controller = what.setup.uses_leader ? "leader" : "predecessor",
-                .least_gap = INFINITY};
-    for (what.seed = 1; what.seed <= seeds; ++what.seed) {
-        const auto one = record_of(what);
-        if (what.seed == 1 && !record.empty()) {
+                .radar = what.setup.radar.fitted,
+                .first_seed = what.seed,
+                .seeds = seeds,
+                .stable_ratio = stable_ratio};
+    const auto first = what.seed;
+    for (; what.seed < first + seeds; ++what.seed) {
+        const auto one = record_of(what, what.seed == first && !record.empty());
+        if (what.seed == first && !record.empty()) {
             write(one, record);
         }
         all.runs.push_back(one.verdict);
         all.string_ratio = std::max(all.string_ratio, one.verdict.string_ratio);
-        all.least_gap = std::min(all.least_gap, one.verdict.least_gap);
-        all.collision = all.collision || one.verdict.collision;
+        all.unstable += one.verdict.string_ratio > stable_ratio ? 1 : 0;
+        all.least_gap = std::fmin(all.least_gap, one.verdict.least_gap);
+        all.collisions += one.verdict.collision ? 1 : 0;
         all.fallbacks += static_cast<double>(one.fallbacks) / seeds;
+        all.radar_spells += static_cast<double>(one.radar_spells) / seeds;
         if (!json && seeds == 1) {
             std::fputs(summary_of(one).c_str(), stdout);
-        } else if (!json) {
-            std::printf("seed %-3ju  string ratio %.4f, %.3f m off at most, gap %.3f m at least, %ju fallbacks\n",
-                        std::uintmax_t{what.seed}, one.verdict.string_ratio,
-                        *std::max_element(one.verdict.error.begin(), one.verdict.error.end()), one.verdict.least_gap,
-                        std::uintmax_t{one.fallbacks});
+        } else if (!json && seeds <= most_lines) {
+            std::printf(
+                "seed %-3ju  string ratio %.4f, %.3f m off at most, gap %.3f m at least, %ju fallbacks, %ju spells "
+                "with the radar alone\n",
+                std::uintmax_t{what.seed}, one.verdict.string_ratio,
+                *std::max_element(one.verdict.error.begin(), one.verdict.error.end()), one.verdict.least_gap,
+                std::uintmax_t{one.fallbacks}, std::uintmax_t{one.radar_spells});
         }
     }
+    all.collision = all.collisions > 0;
+    all.failure_rate = static_cast<double>(all.unstable) / seeds;
+    const auto failures = wilson_interval(all.unstable, seeds);
+    all.failure_low = failures.low;
+    all.failure_high = failures.high;
+    const auto collisions = wilson_interval(all.collisions, seeds);
+    all.collision_low = collisions.low;
+    all.collision_high = collisions.high;
     if (json) {
         std::puts(cles::to_json(all).c_str());
     } else if (seeds > 1) {
-        std::printf("all       string ratio %.4f at most, gap %.3f m at least\n", all.string_ratio, all.least_gap);
+        print_all(all);
     }
     return all.collision ? 1 : 0;
 }

@@ -10,6 +10,9 @@ struct reference {
     motion where{};
     double command = 0;
     double distance = 0;
+    /// The own lag divided by its lag. If this vehicle is slower to react, it has to feed forward more of the
+    /// difference between command and acceleration to accelerate at the same time.
+    double lag_ratio = 1;
 };
 
 /// Swaroop and Hedrick's law for constant spacing (1999): sliding control of
@@ -21,6 +24,13 @@ struct gains {
     double ahead_lead = 0.046, leader_lead = 0.13;
     double max_error = 8; ///< m: larger errors are limited to this, so that a vehicle far behind does not race
 };
+
+/// The gains for this number of updates per second, which `cles-platoon tune` found.
+gains gains_for(double hz);
+
+/// The distance to keep, front to front: `spacing`, and, if the own brakes are weaker, the difference of the distances
+/// in which the two come to a halt from this speed, so that no collision follows if both brake as hard as they can.
+double wanted_distance(double spacing, double speed, double own_brake, double brake_ahead);
 
 /// The acceleration to command. \param weight of the leader: 1: full; 0: only the one ahead counts
 double spacing_law(const gains& law, const motion& self, const reference& ahead, const reference& leader,

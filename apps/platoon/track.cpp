@@ -31,8 +31,8 @@ double track::command_at(double now) const { return last_->u + last_->j * std::m
 motion track::at(double now) const {
     const double command = command_at(now);
     const double ramp = std::min(age(now), trend_horizon);
-    const auto then = advance(last_->position(), (last_->u + command) / 2, lag_, ramp);
-    return advance(then, command, lag_, age(now) - ramp);
+    const auto then = advance(last_->position(), (last_->u + command) / 2, last_->lag, ramp);
+    return advance(then, command, last_->lag, age(now) - ramp);
 }
 
 } // namespace platoon

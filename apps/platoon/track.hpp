@@ -11,8 +11,6 @@ namespace platoon {
 /// lost update makes little difference.
 class track {
   public:
-    explicit track(double lag) : lag_(lag) {}
-
     /// \param now local time, s
     void receive(const state& heard, double now);
     [[nodiscard]] bool known() const noexcept { return last_.has_value(); }
@@ -27,7 +25,6 @@ class track {
   private:
     [[nodiscard]] double age(double now) const;
 
-    double lag_;
     std::optional<state> last_;
     double received_ = 0; ///< when the last update arrived
     double offset_ = 0;   ///< local time minus the sender's, for the fastest update

@@ -32,6 +32,7 @@ constexpr double approach_distance = 40; // m behind the last vehicle at the sta
 constexpr double join_interval = 5;      // s in which only one vehicle may join
 constexpr double join_timeout = 2 * join_interval;
 constexpr std::size_t max_latencies = 1'000'000; // stored of one drive
+constexpr double process_delay = 0.2;            // s, by which an update may be late if its sender is still there
 constexpr double leave_duration = 1;             // s in which it announces that it leaves
 
 std::string reason_of(const std::exception_ptr& failure) {
@@ -81,6 +82,21 @@ cles::service_options options_of(const vehicle_options& vehicle) {
     return out;
 }
 
+// Each link and the radar have random numbers of their own.
+std::uint64_t seed_for(const std::string& purpose, std::uint64_t seed) {
+    for (const char c : purpose) {
+        seed = seed * 1'000'003 + static_cast<unsigned char>(c);
+    }
+    return seed;
+}
+
+/// The vehicle that follows this one; empty: none.
+std::string follower_of(const std::string& ahead, const std::map<std::string, state>& heard) {
+    const auto found =
+        std::find_if(heard.begin(), heard.end(), [&ahead](const auto& each) { return each.second.ahead == ahead; });
+    return found == heard.end() ? "" : found->first;
+}
+
 /// The last vehicle of a platoon: the one that no other follows; of several, the rearmost.
 std::string last_vehicle(const std::map<std::string, state>& heard) {
     std::string last;
@@ -98,14 +114,30 @@ std::string last_vehicle(const std::map<std::string, state>& heard) {
 
 std::int64_t monotonic_ns() { return std::chrono::nanoseconds{steady::now().time_since_epoch()}.count(); }
 
+double utc_at(std::int64_t monotonic) {
+    const std::chrono::duration<double> utc = std::chrono::system_clock::now().time_since_epoch();
+    return utc.count() + static_cast<double>(monotonic - monotonic_ns()) * 1e-9;
+}
+
 vehicle_node::vehicle_node(vehicle_options options)
     : options_(std::move(options)), service_(io_, options_of(options_)), signals_(io_, SIGTERM, SIGINT),
-      radio_(options_.loss, options_.delay, options_.seed) {
+      sensor_(options_.setup.radar, seed_for("radar", options_.seed)) {
     report_.vehicle = options_.setup.name;
     service_.on_bind("state", {.description = "Its mode, position, speed and acceleration",
                                .must_be_signed = !options_.keys.empty()});
     service_.on_push("join", [this](const join_request& who) { accept_follower(who); },
                      {.description = "Follow this vehicle, the last one", .parameters = {}});
+    service_.on_push("split",
+                     [this] {
+                         if (!options_.setup.radar.fitted) {
+                             throw cles::error(cles::errc::unavailable, report_.vehicle + " has no radar to keep a "
+                                                                                          "distance by");
+                         }
+                         if (driver_ && !driver_->ahead().empty()) {
+                             driver_->split();
+                         }
+                     },
+                     {.description = "Lead those behind, at a distance", .parameters = {}, .idempotent = true});
     service_.on_push("leave",
                      [this] {
                          if (driver_ && !left_at_) {
@@ -171,13 +203,19 @@ void vehicle_node::accept_follower(const join_request& who) {
     if (!follower_.empty() && follower_ != who.name && now() < followed_at_ + join_interval) {
         throw cles::error(cles::errc::busy, follower_ + " is joining behind " + report_.vehicle);
     }
+    if (who.merges && !driver_->admits().empty() && driver_->admits() != who.name) {
+        throw cles::error(cles::errc::busy, driver_->admits() + " is merging behind " + report_.vehicle);
+    }
     follower_ = who.name;
     followed_at_ = now();
+    if (who.merges) {
+        driver_->admit(who.name);
+    }
 }
 
 asio::awaitable<std::map<std::string, state>> vehicle_node::listen() {
     std::map<std::string, state> heard;
-    auto feed = co_await service_.async_bind<state>("all:state");
+    auto feed = co_await service_.async_bind<localization>("all:state");
     asio::steady_timer enough{io_, 300ms + std::chrono::milliseconds{static_cast<int>(3000 / options_.setup.hz)}};
     enough.async_wait([&feed](boost::system::error_code failed) {
         if (!failed) {
@@ -188,7 +226,7 @@ asio::awaitable<std::map<std::string, state>> vehicle_node::listen() {
         for (;;) {
             const auto item = co_await feed.async_next();
             if (item.has_value()) {
-                heard[item.publisher] = item.value;
+                heard[item.publisher] = to_state(item.value, options_.start_utc);
             }
         }
     } catch (const cles::error& e) {
@@ -200,7 +238,8 @@ asio::awaitable<std::map<std::string, state>> vehicle_node::listen() {
 }
 
 asio::awaitable<void> vehicle_node::join() {
-    const join_request self{options_.setup.name};
+    const bool merges = !options_.behind.empty();
+    const join_request self{options_.setup.name, merges};
     for (const double until = now() + join_timeout;;) {
         const auto heard = co_await listen();
         if (heard.empty()) {
@@ -211,7 +250,10 @@ asio::awaitable<void> vehicle_node::join() {
         if (heard.contains(self.name)) {
             throw cles::error(cles::errc::invalid_name, "a vehicle named " + self.name + " is already on the road");
         }
-        const auto last = last_vehicle(heard);
+        if (merges && !heard.contains(options_.behind)) {
+            throw cles::error(cles::errc::no_target, options_.behind + " is not received");
+        }
+        const auto last = merges ? options_.behind : last_vehicle(heard);
         std::optional<cles::error> refused;
         try {
             co_await service_.async_push(last + ":join", self);
@@ -222,7 +264,11 @@ asio::awaitable<void> vehicle_node::join() {
             auto setup = options_.setup;
             const auto& at = heard.at(last);
             setup.ahead = last;
-            setup.start = {at.x - approach_distance, at.v, 0};
+            setup.merges = merges;
+            setup.before = merges ? follower_of(last, heard) : "";
+            const double since = now() - at.t;
+            const double distance = merges ? setup.spacing : approach_distance;
+            setup.start = {at.x + at.v * since - distance, at.v, 0};
             begin(setup);
             co_return;
         }
@@ -235,6 +281,7 @@ asio::awaitable<void> vehicle_node::join() {
 asio::awaitable<void> vehicle_node::drive() {
     const double hz = options_.setup.hz;
     const auto decisions = std::int64_t{decisions_per_update(hz)};
+    const auto echoes = std::int64_t{decisions_per_echo(options_.setup.radar, hz)};
     const double pace = 1 / (hz * static_cast<double>(decisions));
     const double first = send_offset(options_.turn, options_.turns, hz);
     asio::steady_timer timer{io_};
@@ -244,6 +291,9 @@ asio::awaitable<void> vehicle_node::drive() {
         const std::chrono::nanoseconds due{options_.start_ns + std::llround(at * 1e9)};
         timer.expires_at(steady::time_point{due});
         co_await timer.async_wait(asio::use_awaitable);
+        if (count % echoes == 0) {
+            measure(at);
+        }
         driver_->step(at);
         if (count % decisions == 0) {
             publish_state();
@@ -254,12 +304,44 @@ asio::awaitable<void> vehicle_node::drive() {
     }
 }
 
+impairment& vehicle_node::link_from(const std::string& name) {
+    return links_.try_emplace(name, options_.losses, options_.delay, seed_for(name, options_.seed)).first->second;
+}
+
+void vehicle_node::measure(double at) {
+    if (!driver_->ahead().empty()) {
+        seen_ = driver_->ahead();
+    }
+    const auto found = truth_.find(seen_);
+    if (found == truth_.end() || driver_->mode() == role::merge || found->second.mode == role::merge) {
+        return;
+    }
+    const auto& ahead = found->second;
+    const double age = at - ahead.t;
+    const bool ended = age > driver::silent_after / options_.setup.hz + process_delay;
+    if (ended && ahead.mode == role::leave) {
+        seen_.clear();
+        return;
+    }
+    const double command = ended ? failsafe_command(ahead.u) : ahead.u; // as the observer of the drive assumes it
+    const auto there = advance(ahead.position(), command, ahead.lag, age);
+    const auto self = advance(driver_->position(), driver_->command(), driver_->limits().lag, at - driver_->now());
+    const echo exact{.range = there.x - driver_->limits().length - self.x, .rate = there.v - self.v};
+    if (const auto seen = sensor_.measure(exact)) {
+        driver_->measure(*seen, at);
+    }
+}
+
 void vehicle_node::publish_state() {
-    auto told = driver_->report();
+    auto told = to_localization(driver_->report(), options_.start_utc);
     told.sent_ns = monotonic_ns();
     service_.update("state", told);
     ++report_.sent;
-    for (const auto& name : driver_->needed()) {
+    auto needed = driver_->needed();
+    if (!seen_.empty()) {
+        needed.insert(seen_);
+    }
+    for (const auto& name : needed) {
         if (bound_.insert(name).second) {
             asio::co_spawn(io_, hear(name), [this, name](const std::exception_ptr& failure) {
                 bound_.erase(name); // the next update retries it, if it is still needed
@@ -273,12 +355,12 @@ void vehicle_node::publish_state() {
 }
 
 asio::awaitable<void> vehicle_node::hear(std::string name) {
-    auto feed = co_await service_.async_bind<state>(name + ":state", cles::bind_options{}.multicast());
+    auto feed = co_await service_.async_bind<localization>(name + ":state", cles::bind_options{}.multicast());
     bool first = true; // may be an older one, repeated for this binder
-    while (driver_->needs(name)) {
+    while (driver_->needs(name) || name == seen_) {
         const auto item = co_await feed.async_next();
         if (item.has_value()) {
-            receive(name, item.value, !first);
+            receive(name, to_state(item.value, options_.start_utc), !first);
             first = false;
         } else if (item.kind == cles::feed_event::gap) {
             report_.missed += item.missed;
@@ -294,7 +376,8 @@ void vehicle_node::receive(const std::string& from, const state& heard, bool tim
             report_.latency_us.push_back(static_cast<double>(monotonic_ns() - heard.sent_ns) * 1e-3);
         }
     }
-    const auto later = radio_.next();
+    truth_[from] = heard;
+    const auto later = link_from(from).next();
     if (!later) {
         report_.lost += counts ? 1 : 0;
     } else if (*later == 0) {

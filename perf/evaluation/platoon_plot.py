@@ -33,11 +33,12 @@ def colour_of(index, count):
 
 
 class Chart:
-    def __init__(self, title, x_label, y_label, x_range, y_range, log_x=False):
+    def __init__(self, title, x_label, y_label, x_range, y_range, log_x=False, x_ticks=None):
         self.x_range, self.y_range, self.log_x = x_range, y_range, log_x
         self.parts = [f'<text x="{LEFT}" y="24" font-size="15">{title}</text>']
-        x_ticks = [10**i for i in range(round(math.log10(x_range[0])), round(math.log10(x_range[1])) + 1)] if log_x \
-            else ticks_of(*x_range)
+        if not x_ticks:
+            x_ticks = [10**i for i in range(round(math.log10(x_range[0])), round(math.log10(x_range[1])) + 1)] if log_x \
+                else ticks_of(*x_range)
         for value in x_ticks:
             x = self.x(value)
             self.line(x, TOP, x, HEIGHT - BOTTOM, GRID)
@@ -75,6 +76,14 @@ class Chart:
             elif run:
                 self.parts.append(f'<polyline points="{" ".join(run)}" fill="none" stroke="{colour}" stroke-width="1.4"/>')
                 run = []
+
+    def point(self, x, y, colour, low=None, high=None):
+        """A point with its interval."""
+        if low is not None:
+            self.line(self.x(x), self.y(low), self.x(x), self.y(high), colour, 'stroke-width="2"')
+            for end in (low, high):
+                self.line(self.x(x) - 4, self.y(end), self.x(x) + 4, self.y(end), colour, 'stroke-width="2"')
+        self.parts.append(f'<circle cx="{self.x(x):.1f}" cy="{self.y(y):.1f}" r="3.5" fill="{colour}"/>')
 
     def legend(self, entries):
         """(text, colour) from the top down, as many as fit."""

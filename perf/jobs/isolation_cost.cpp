@@ -15,12 +15,12 @@
 #include "perf/pull/pull_exchange.hpp"
 #include "perf/support/child_process.hpp"
 #include "perf/support/latency_recorder.hpp"
+#include "perf/support/number_option.hpp"
 #include "perf/support/pinning.hpp"
 
 #include <boost/asio/io_context.hpp>
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -54,11 +54,7 @@ options read(std::span<char*> arguments) {
         if (option == "--spread") {
             o.spread = true;
         } else if (option == "--rounds" && i + 1 < arguments.size()) {
-            const std::string_view text = arguments[++i];
-            const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), o.rounds);
-            if (wrong != std::errc{} || end != text.data() + text.size() || o.rounds == 0 || o.rounds > 1000) {
-                throw std::invalid_argument("--rounds takes a number from 1 to 1000");
-            }
+            o.rounds = perf::number(option, arguments[++i], 1000U);
         } else if (!option.starts_with('-') && o.plugin.empty()) {
             o.plugin = option;
         } else {
@@ -69,12 +65,6 @@ options read(std::span<char*> arguments) {
         throw std::invalid_argument("usage: cles_isolation_cost PLUGIN [--rounds N] [--spread]");
     }
     return o;
-}
-
-double median(std::vector<double> of) {
-    const auto middle = of.begin() + static_cast<std::ptrdiff_t>(of.size() / 2);
-    std::nth_element(of.begin(), middle, of.end());
-    return *middle;
 }
 
 int measure(const options& o) {
@@ -117,7 +107,7 @@ int measure(const options& o) {
         cost.push_back((there_us.back() - here_us.back()) / pull_us.back());
     }
     std::filesystem::remove(socket);
-    const auto pull = median(pull_us), in_process = median(here_us), isolated = median(there_us);
+    const auto pull = perf::median(pull_us), in_process = perf::median(here_us), isolated = perf::median(there_us);
     const auto limit = in_process + most * pull;
     std::printf("PULL over a Unix socket, p50     %8.1f us\n", pull);
     std::printf("empty DELEGATE in process, p50   %8.1f us\n", in_process);

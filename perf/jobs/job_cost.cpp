@@ -75,12 +75,6 @@ options read(std::span<char*> arguments) {
 
 cles::run_options polling(const options& o) { return {.busy_poll = std::chrono::microseconds{o.busy_poll_us}}; }
 
-double median(std::vector<double> of) {
-    const auto middle = of.begin() + static_cast<std::ptrdiff_t>(of.size() / 2);
-    std::nth_element(of.begin(), middle, of.end());
-    return *middle;
-}
-
 int measure(const options& o) {
     const auto ends = perf::place_ends();
     perf::child_process hand{ends.server, [](const perf::child_process::announce& announce) {
@@ -118,10 +112,11 @@ int measure(const options& o) {
         ratio.push_back(job_us.back() / packet_us.back());
         rate.push_back(static_cast<double>(many) / took.count());
     }
-    std::printf("hand-written exchange, p50     %8.1f us\n", median(packet_us));
-    std::printf("empty job, p50                 %8.1f us  %.2fx (%.2f to %.2f)\n", median(job_us), median(ratio),
-                *std::min_element(ratio.begin(), ratio.end()), *std::max_element(ratio.begin(), ratio.end()));
-    std::printf("empty jobs, %zu in flight       %8.0f a second\n", in_flight, median(rate));
+    std::printf("hand-written exchange, p50     %8.1f us\n", perf::median(packet_us));
+    std::printf("empty job, p50                 %8.1f us  %.2fx (%.2f to %.2f)\n", perf::median(job_us),
+                perf::median(ratio), *std::min_element(ratio.begin(), ratio.end()),
+                *std::max_element(ratio.begin(), ratio.end()));
+    std::printf("empty jobs, %zu in flight       %8.0f a second\n", in_flight, perf::median(rate));
     return 0;
 }
 

@@ -6,6 +6,18 @@
 
 namespace cles::perf {
 
+double median(std::vector<double> of) {
+    const auto middle = of.begin() + static_cast<std::ptrdiff_t>(of.size() / 2);
+    std::nth_element(of.begin(), middle, of.end());
+    return *middle;
+}
+
+void latency_recorder::copy_to(latency_recorder& other) const noexcept {
+    const auto count = std::min(count_, other.remaining());
+    std::copy_n(nanoseconds_.begin(), count, other.nanoseconds_.begin() + static_cast<std::ptrdiff_t>(other.count_));
+    other.count_ += count;
+}
+
 latencies latency_recorder::quantiles() {
     if (count_ == 0) {
         return {};

@@ -16,6 +16,9 @@ struct latencies {
     double max = 0;
 };
 
+/// Of figures, such as those of several passes. \pre there are some
+[[nodiscard]] double median(std::vector<double> of);
+
 /// Stores every latency of one pass, so that its quantiles are exact. Recording neither allocates nor touches new
 /// pages.
 class latency_recorder {
@@ -30,6 +33,8 @@ class latency_recorder {
     void record(std::chrono::nanoseconds latency) noexcept {
         nanoseconds_[count_++] = static_cast<std::uint64_t>(latency.count());
     }
+    /// Records in `other` what was recorded here, as far as there is space.
+    void copy_to(latency_recorder& other) const noexcept;
     /// Reorders what was recorded.
     latencies quantiles();
 

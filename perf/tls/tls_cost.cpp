@@ -17,7 +17,6 @@
 
 #include <boost/asio/io_context.hpp>
 
-#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdlib>
@@ -76,11 +75,6 @@ class exchange {
     std::unique_ptr<service> client_;
     std::unique_ptr<pull_load> load_;
 };
-
-double median(std::vector<double> values) {
-    std::ranges::sort(values);
-    return values[values.size() / 2];
-}
 
 void measure(std::size_t passes, std::size_t requests) {
     small_fleet of;

@@ -137,7 +137,9 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
                {.description = "Streams, and the outcomes of their frames", .idempotent = true, .inline_ok = true});
     to.on_delegate("FMV_Processing",
                    [here](const cles::request& asked, const cles::responder& answer) { process(asked, answer, *here); },
-                   {.description = "Tracks of what moves, after one more frame of a stream", .idempotent = true});
+                   {.description = "Tracks of what moves, after one more frame of a stream",
+                    .idempotent = true,
+                    .local = true}); // this node has the stream's earlier frames
 }
 
 } // namespace fmv

@@ -100,7 +100,8 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
                    [data](const cles::request& asked, const cles::responder& answer) { train(asked, answer, *data); },
                    {.description = "sgd/train: a linear classifier for 'count' points from point 'first'",
                     .parameters = {"train"},
-                    .idempotent = true});
+                    .idempotent = true,
+                    .local = true}); // other nodes may have other data
 }
 
 } // namespace sgd

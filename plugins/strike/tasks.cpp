@@ -123,6 +123,7 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
                    [own](const cles::request& asked, const cles::responder& answer) { carry_out(asked, answer, *own); },
                    {.description = "Strikes a target: where it was, when, and how it moves",
                     .inline_ok = true,
+                    .local = true, // the weapons are those of this node
                     .must_be_signed = wanted.must_be_signed.value_or(false)});
 }
 

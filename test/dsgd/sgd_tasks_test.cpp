@@ -25,6 +25,10 @@ struct fixture : cles::test::asked_node {
 
 BOOST_FIXTURE_TEST_SUITE(sgd_tasks, fixture)
 
+BOOST_AUTO_TEST_CASE(its_jobs_stay_on_this_node) {
+    BOOST_TEST(ask("PULL self:cles").find("\"local\":true") != std::string::npos);
+}
+
 BOOST_AUTO_TEST_CASE(the_data_is_told) {
     BOOST_TEST(ask("PULL self:sgd") == R"({"seed":1,"per_class":1000,"separation":7})");
 }

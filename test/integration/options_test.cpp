@@ -161,6 +161,26 @@ BOOST_FIXTURE_TEST_CASE(a_deadline_may_be_anything_from_nothing_on, nodes) {
     }
 }
 
+BOOST_FIXTURE_TEST_CASE(the_hops_of_a_request_are_checked, nodes) {
+    for (const auto hops : {0U, 8U, 16U, 17U}) {
+        answer<> got;
+        tower.async_pull("car1:speed", got.options().hops(hops), got.take());
+        run_until(io, [&] { return got.done(); });
+        if (hops > 16) {
+            BOOST_TEST((got.code == errc::invalid_option), got.code.message());
+            BOOST_TEST(got.words == "call_options::hops is 17: must be 0 to 16");
+        } else {
+            BOOST_TEST(!got.code, got.words);
+        }
+    }
+    answer<> in_text, unknown;
+    tower.async_request("PULL car1:speed hops=15", in_text.options(), in_text.take());
+    tower.async_request("PULL car1:speed via=car7", unknown.options(), unknown.take());
+    run_until(io, [&] { return in_text.done() && unknown.done(); });
+    BOOST_TEST(!in_text.code, in_text.words);
+    BOOST_TEST((unknown.code == errc::bad_request), unknown.words);
+}
+
 struct bind_case {
     cles::bind_options options;
     std::string_view refused{}; ///< the option; empty: it is accepted
@@ -186,6 +206,9 @@ BOOST_FIXTURE_TEST_CASE(a_bindings_options_work_or_are_refused_by_name, nodes) {
         {made{}.keep(65'536)},
         {made{}.keep(65'537), "keep"},
         {made{}.keep(most_32), "keep"},
+        {made{}.hops(0)},
+        {made{}.hops(16)},
+        {made{}.hops(17), "hops"},
     };
     for (const auto& each : cases) {
         feed_log feed;

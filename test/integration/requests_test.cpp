@@ -149,7 +149,7 @@ BOOST_DATA_TEST_CASE(a_command_is_a_sentence_of_the_language, carriers, kind) {
     two_nodes n{kind};
     answer<> pulled;
     answer<> pushed;
-    for (const std::string_view adverb : {"id=7", "reply=no", "progress=yes", "hops=3", "colour=red"}) {
+    for (const std::string_view adverb : {"id=7", "reply=no", "progress=yes", "via=car2", "colour=red"}) {
         answer<> refused;
         n.tower.async_request("PUSH car1:echo " + std::string{adverb}, refused.options(), refused.take());
         run_until(n.io, [&] { return refused.done(); });

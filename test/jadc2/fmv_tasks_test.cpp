@@ -41,6 +41,10 @@ struct fixture : cles::test::asked_node {
 
 BOOST_FIXTURE_TEST_SUITE(fmv_tasks, fixture)
 
+BOOST_AUTO_TEST_CASE(its_jobs_stay_on_this_node) {
+    BOOST_TEST(ask("PULL self:cles").find("\"local\":true") != std::string::npos);
+}
+
 BOOST_AUTO_TEST_CASE(frames_become_tracks) {
     fmv::found last;
     for (std::uint64_t i = 0; i < 60; ++i) {

@@ -32,6 +32,10 @@ struct fixture : cles::test::asked_node {
 
 BOOST_FIXTURE_TEST_SUITE(strike_tasks, fixture)
 
+BOOST_AUTO_TEST_CASE(its_jobs_stay_on_this_node) {
+    BOOST_TEST(ask("PULL self:cles").find("\"local\":true") != std::string::npos);
+}
+
 BOOST_AUTO_TEST_CASE(an_order_is_carried_out) {
     const auto before = now();
     const auto out = cles::from_json<strike::outcome>(give(order("o1")));

@@ -3,6 +3,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 namespace driver {
@@ -18,6 +19,7 @@ struct road {
     platoon::state v0{.mode = role::lead, .lead = "v0", .v = 25};
     platoon::state v1{.mode = role::follow, .ahead = "v0", .lead = "v0", .behind = 15, .x = -15, .v = 25};
     std::set<std::string> silent{};
+    bool radar = false;
     double now = 0;
 
     void drive(double seconds) {
@@ -27,6 +29,10 @@ struct road {
             }
             tell("v0", v0);
             tell("v1", v1);
+            if (radar) {
+                const auto self = advance(v2.position(), v2.command(), 0.3, now - v2.now());
+                v2.measure({.range = v1.x - 5 - self.x, .rate = v1.v - self.v}, now);
+            }
             v2.step(now);
             for (auto* other : {&v0, &v1}) {
                 const auto next = advance(other->position(), other->u, 0.3, period);
@@ -91,6 +97,56 @@ BOOST_AUTO_TEST_CASE(it_falls_back_when_three_updates_of_the_one_ahead_are_misse
     all.drive(12);
     BOOST_TEST(all.v2.position().v == 0);
     BOOST_TEST((all.v2.report().mode == role::fallback));
+}
+
+BOOST_AUTO_TEST_CASE(with_a_radar_it_falls_back_to_a_time_gap_instead) {
+    road all;
+    all.radar = true;
+    all.drive(1);
+    all.silent = {"v1"};
+    all.drive(4 * period);
+    BOOST_TEST((all.v2.mode() == role::radar));
+    BOOST_TEST(std::abs(all.v2.command()) < 0.1); // a short interruption changes almost nothing
+    BOOST_TEST(all.v2.report().lead == "v0");
+    all.drive(3);
+    BOOST_TEST(all.v2.report().lead == "v2"); // those behind have to make room with it
+    all.drive(40);
+    BOOST_TEST(std::abs(all.v2.position().v - 25) < 0.1);
+    BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.position().x - (5 + 5 + 1.5 * 25)) < 1);
+    BOOST_TEST(std::abs(all.v2.desired_distance() - (5 + 5 + 1.5 * 25)) < 1);
+    all.silent.clear();
+    all.drive(60);
+    BOOST_TEST((all.v2.mode() == role::follow));
+    BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.position().x - 15) < 0.05);
+}
+
+BOOST_AUTO_TEST_CASE(by_its_radar_it_stops_behind_one_that_stops) {
+    road all;
+    all.radar = true;
+    all.drive(1);
+    all.silent = {"v0", "v1"};
+    all.drive(1);
+    all.v1.u = -5;
+    double least = 15;
+    for (int i = 0; i < 250; ++i) {
+        all.drive(period);
+        least = std::min(least, all.v1.x - all.v2.position().x);
+    }
+    BOOST_TEST((all.v2.mode() == role::radar));
+    BOOST_TEST(all.v2.position().v < 0.5);
+    BOOST_TEST(least > 8); // 3 m from bumper to bumper
+}
+
+BOOST_AUTO_TEST_CASE(without_radar_echoes_it_brakes_after_all) {
+    road all;
+    all.radar = true;
+    all.drive(1);
+    all.silent = {"v1"};
+    all.drive(1);
+    BOOST_TEST((all.v2.mode() == role::radar));
+    all.radar = false;
+    all.drive(0.5);
+    BOOST_TEST((all.v2.mode() == role::fallback));
 }
 
 BOOST_AUTO_TEST_CASE(an_update_that_comes_after_all_has_cost_next_to_nothing) {
@@ -165,6 +221,44 @@ BOOST_AUTO_TEST_CASE(when_the_leader_leaves_the_next_one_leads) {
     BOOST_TEST(v1.report().lead == "v1");
     v1.step(20);
     BOOST_TEST(std::abs(v1.position().v - 25) < 0.1);
+}
+
+BOOST_AUTO_TEST_CASE(it_makes_room_for_one_that_merges_and_then_follows_it) {
+    road all;
+    all.drive(1);
+    all.v1.admits = "v9";
+    all.drive(period);
+    BOOST_TEST(all.v2.needs("v9"));
+    all.drive(14);
+    BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.position().x - 30) < 1);
+    platoon::state v9{
+        .mode = role::merge, .ahead = "v1", .lead = "v0", .behind = 30, .t = all.now, .x = all.v1.x - 15, .v = 25};
+    all.v2.receive("v9", v9, all.now);
+    BOOST_TEST(all.v2.ahead() == "v1");
+    v9.mode = role::follow;
+    v9.t += period;
+    v9.x += period * 25;
+    all.v2.receive("v9", v9, all.now);
+    BOOST_TEST(all.v2.ahead() == "v9");
+    BOOST_TEST(std::abs(all.v2.desired_distance() - 15) < 1);
+}
+
+BOOST_AUTO_TEST_CASE(one_that_splits_off_leads) {
+    road all;
+    all.radar = true;
+    all.drive(1);
+    all.v2.split();
+    BOOST_TEST((all.v2.report().mode == role::lead));
+    BOOST_TEST(all.v2.report().lead == "v2");
+    BOOST_TEST(all.v2.needed().empty());
+    all.drive(40);
+    BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.position().x - (5 + 5 + 1.5 * 25)) < 1);
+}
+
+BOOST_AUTO_TEST_CASE(behind_stronger_brakes_it_keeps_a_larger_distance) {
+    BOOST_TEST(platoon::wanted_distance(15, 25, 8, 8) == 15);
+    BOOST_TEST(platoon::wanted_distance(15, 25, 8, 5) == 15);
+    BOOST_TEST(std::abs(platoon::wanted_distance(15, 25, 5, 8) - (15 + 625.0 / 10 - 625.0 / 16)) < 1e-9);
 }
 
 BOOST_AUTO_TEST_CASE(where_nobody_is_ahead_after_all_it_brakes) {

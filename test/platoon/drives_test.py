@@ -3,6 +3,7 @@
 """A platoon as its users run it, each vehicle a process: what vehicles receive from each other, joining, leaving."""
 
 import json
+import math
 import os
 import subprocess
 import tempfile
@@ -47,6 +48,19 @@ class Drive(DriveTest):
         gap = max(e for e in errors if e is not None)
         self.assertGreater(gap, 10)
         self.assertLess(abs(errors[-1]), gap - 5)
+
+
+    def test_vehicles_may_differ_and_lose_in_bursts(self):
+        found = self.drive("--vehicles", 4, "--hz", 50, "--seconds", 7, "--loss", 10, "--burst", 4, "--lags", 0.2, 0.5,
+                           "--brakes", 5.5, 8)
+        self.assertEqual(found["burst"], 4)
+        self.assertAlmostEqual(found["lost"] / found["received"], 0.1, delta=0.08)
+        self.assertGreater(found["verdict"]["least_gap"], 8)
+        leader = next(c for c in found["courses"] if c["vehicle"] == "v0")  # its road begins at an angle of 30 degrees
+        degrees = leader["lat"][-1] - leader["lat"][0]
+        driven = leader["place"][-1] - leader["place"][0]
+        self.assertGreater(driven, 50)
+        self.assertAlmostEqual(degrees * 111200 / math.cos(math.radians(30)), driven, delta=0.01 * driven)
 
 
 class TwoHosts(unittest.TestCase):

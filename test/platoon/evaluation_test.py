@@ -32,7 +32,7 @@ class Evaluation(unittest.TestCase):
                 self.assertGreaterEqual(len(drawn.findall(".//{http://www.w3.org/2000/svg}polyline")), 1, plot)
         self.assertEqual({plot.name for plot in plots}, {"speed.svg", "error.svg", "latency.svg"})
         reported.check(self, "platoon", result)
-        self.assertEqual(len(result["simulated"]), 12)
+        self.assertEqual(len(result["simulated"]), 18)
         figures = {figure["name"]: figure for figure in result["figures"]}
         self.assertEqual(figures["string_ratio_leader_50"]["value"], result["checks"]["string_ratio"]["50 Hz"])
         self.assertEqual(figures["nobody_collides"]["reached"], True)
@@ -40,7 +40,8 @@ class Evaluation(unittest.TestCase):
         for picture in result["pictures"]:
             xml.etree.ElementTree.fromstring(picture["svg"])
         self.assertTrue({"title", "date", "command", "machine"} <= result.keys())
-        self.assertTrue(all(len(row["ratios"]) == 2 for row in result["simulated"]))
+        self.assertTrue(all(len(row["ratios"]) == (2 if row["loss_percent"] else 1) for row in result["simulated"]))
+        self.assertEqual(figures["string_failures_leader_10_bursts"]["runs"], 2)
         self.assertTrue(result["checks"]["nobody_collides"])
         self.assertGreater(result["driven"][0]["latency"]["count"], 0)
         self.assertEqual(result["killed"][0]["killed"], 1)
@@ -59,6 +60,21 @@ class Evaluation(unittest.TestCase):
         self.assertEqual((found["p999_50_hz_0"]["value"], found["p999_50_hz_0"]["reached"]), (1.5, True))
         self.assertEqual((found["p999_50_hz_10"]["value"], found["p999_50_hz_10"]["reached"]), (2.1, False))
         self.assertEqual((found["p999_50_hz_10"]["low"], found["p999_50_hz_10"]["high"]), (0.1, 2.5))
+
+    def test_the_pictures_of_the_page_can_be_drawn(self):
+        with tempfile.TemporaryDirectory() as folder:
+            figures = Path(folder) / "figures.json"
+            subprocess.run([sys.executable, "-B", SCRIPTS / "platoon_pictures.py", "--seeds", "1", "--programs", PROGRAMS, "-o",
+                            folder, "--figures", figures], check=True, timeout=150)
+            found = json.loads(figures.read_text(encoding="utf-8"))
+            drawn = {path.stem.removeprefix("platoon_"): xml.etree.ElementTree.parse(path).getroot()
+                     for path in Path(folder).glob("*.svg")}
+        self.assertEqual(set(drawn), {"track", "failures", "bursts", "degradation", "differences", "merge", "split"})
+        self.assertEqual(len(found["failures"]["10 % lost"]), 3)
+        lines = {name: len(root.findall(".//{http://www.w3.org/2000/svg}polyline")) for name, root in drawn.items()}
+        self.assertGreaterEqual(lines["degradation"], 5)
+        self.assertEqual(lines["merge"], 6)  # with the vehicle that merges
+        self.assertGreaterEqual(len(drawn["failures"].findall(".//{http://www.w3.org/2000/svg}circle")), 12)
 
     def test_a_record_that_is_none(self):
         with tempfile.TemporaryDirectory() as folder:

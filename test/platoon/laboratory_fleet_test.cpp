@@ -69,7 +69,9 @@ BOOST_AUTO_TEST_CASE(each_may_do_what_it_needs) {
     }
     BOOST_TEST(allows(made, "v0", verb::push, "v1:join"));
     BOOST_TEST(!allows(made, "v0", verb::push, "v1:leave"));
+    BOOST_TEST(!allows(made, "v0", verb::push, "v1:split"));
     BOOST_TEST(allows(made, "operator", verb::push, "v1:leave"));
+    BOOST_TEST(allows(made, "operator", verb::push, "v1:split"));
     BOOST_TEST(!allows(made, "operator", verb::push, "v1:join"));
 }
 

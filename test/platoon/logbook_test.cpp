@@ -16,7 +16,7 @@ platoon::state told(double t, double x, double v) { return {.t = t, .x = x, .v =
 BOOST_AUTO_TEST_SUITE(logbook)
 
 BOOST_AUTO_TEST_CASE(between_two_updates_it_knows_where_a_vehicle_was, *boost::unit_test::tolerance(1e-9)) {
-    platoon::logbook book{0.3};
+    platoon::logbook book;
     const auto x = [](double t) { return 3 + 20 * t - 2 * t * t + t * t * t; };
     const auto v = [](double t) { return 20 - 4 * t + 3 * t * t; };
     book.add("v1", told(1, x(1), v(1)));
@@ -28,7 +28,7 @@ BOOST_AUTO_TEST_CASE(between_two_updates_it_knows_where_a_vehicle_was, *boost::u
 }
 
 BOOST_AUTO_TEST_CASE(one_that_was_killed_brakes_and_one_that_left_is_not_there) {
-    platoon::logbook book{0.3};
+    platoon::logbook book;
     book.add("v1", told(1, 0, 20));
     book.add("v2", told(1, -15, 20));
     BOOST_TEST(std::abs(book.position("v1", 3)->v - 20) < 1e-9);
@@ -39,6 +39,16 @@ BOOST_AUTO_TEST_CASE(one_that_was_killed_brakes_and_one_that_left_is_not_there) 
     BOOST_TEST(book.position("v2", 1).has_value() == false);
     BOOST_TEST(book.has_left("v2"));
     BOOST_TEST(!book.has_left("v1"));
+}
+
+BOOST_AUTO_TEST_CASE(one_that_merges_is_not_in_the_lane_before) {
+    platoon::logbook book;
+    auto merging = told(1, 0, 20);
+    merging.mode = platoon::role::merge;
+    book.add("v1", merging);
+    book.add("v1", told(2, 20, 20));
+    BOOST_TEST(!book.position("v1", 1.5));
+    BOOST_TEST(book.position("v1", 2.5)->x == 30);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

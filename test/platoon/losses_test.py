@@ -11,7 +11,7 @@ from processes import PATIENCE, DriveTest, children_of, ended, free_group, is_ru
 
 class Killed(DriveTest):
     def test_the_leader_is_killed(self):
-        found = self.drive("--vehicles", 4, "--seconds", 10, "--vanish", "0@0.5")
+        found = self.drive("--vehicles", 4, "--seconds", 10, "--vanish", "0@0.5", "--no-radar")
         self.assertFalse(found["steady"])
         self.assertIn("gone", self.modes(found, "v0"))
         self.assertIn("fallback", self.modes(found, "v1"))
@@ -19,13 +19,20 @@ class Killed(DriveTest):
             self.assertLess(self.speed(found, vehicle), 1, found["events"])
 
     def test_one_in_the_middle_is_killed(self):
-        found = self.drive("--vehicles", 5, "--seconds", 5, "--vanish", "2@1")
+        found = self.drive("--vehicles", 5, "--seconds", 5, "--vanish", "2@1", "--no-radar")
         self.assertIn("fallback", self.modes(found, "v3"))
         self.assertIn("v2 ahead is silent", [e["why"] for e in found["events"]])
         for vehicle in ("v3", "v4"):  # which brake, while the leader does not yet
             self.assertLess(self.speed(found, vehicle), 18, found["events"])
         for vehicle in ("v0", "v1"):
             self.assertGreater(self.speed(found, vehicle), 24, found["events"])
+
+    def test_with_radars_those_behind_stop_behind_it(self):
+        found = self.drive("--vehicles", 4, "--seconds", 13, "--vanish", "1@0.5")
+        self.assertIn("radar", self.modes(found, "v2"))
+        for vehicle in ("v2", "v3"):
+            self.assertNotIn("fallback", self.modes(found, vehicle))
+            self.assertLess(self.speed(found, vehicle), 2, found["events"])
 
     def test_the_last_is_killed(self):
         found = self.drive("--vehicles", 3, "--seconds", 4, "--vanish", "2@1")

@@ -123,7 +123,7 @@ class Drive(Secured):
     def test_a_vehicle_vanishes(self):
         found = self.drive("--vehicles", 3, "--seconds", 6, "--vanish", "1@2", "--secured")
         self.assertIn("killed", self.modes(found, "v1"))
-        self.assertIn("fallback", self.modes(found, "v2"))
+        self.assertIn("radar", self.modes(found, "v2"))
 
     def test_the_keys_are_removed_when_it_is_interrupted(self):
         os.environ["TMPDIR"] = self.folder

@@ -4,6 +4,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 namespace simulation {
@@ -20,9 +21,52 @@ double worst_ratio(platoon::scenario what, unsigned seeds) {
 }
 
 platoon::scenario with(double hz, double loss) {
-    platoon::scenario what{.vehicles = 20, .loss = loss};
+    platoon::scenario what{.vehicles = 20, .losses = platoon::losses_of(loss, 0)};
     what.setup.hz = hz;
     return what;
+}
+
+// If any vehicle falls silent at any time, those behind it stop, those ahead continue, and none of them collides with
+// another. A vehicle without a driver may collide if those ahead brake harder than its own brakes do by themselves;
+// that is not tested.
+void drive_while_one_vanishes(bool fitted) {
+    for (const std::ptrdiff_t who : {0, 1, 5, 8, 9}) {
+        for (const double at : {2.0, 5.5, 7.0, 12.0}) {
+            for (const double hz : {10.0, 50.0}) {
+                auto what = with(hz, 0.1);
+                what.setup.radar.fitted = fitted;
+                what.vehicles = 10;
+                what.incidents = {{platoon::incident::vanish, static_cast<std::size_t>(who), at}};
+                what.seconds = 40;
+                std::map<std::string, platoon::role> modes;
+                what.on_change = [&](double, const std::string& vehicle, platoon::role mode, const std::string&) {
+                    modes[vehicle] = mode;
+                };
+                std::vector<platoon::sighting> last;
+                double least = what.setup.spacing;
+                simulate(what, [&](double, const auto& where) {
+                    last = where;
+                    for (std::size_t i = 1; i < where.size(); ++i) {
+                        if (static_cast<std::ptrdiff_t>(i) != who) {
+                            least = std::min(least, where[i].distance - what.setup.limits.length);
+                        }
+                    }
+                });
+                BOOST_TEST(least > 0, "v" << who << " at " << at << " s, " << hz << " Hz: " << least);
+                for (std::size_t i = 0; i < last.size(); ++i) {
+                    if (static_cast<std::ptrdiff_t>(i) > who) {
+                        BOOST_TEST(last[i].where.v < 0.5, "v" << i << " drives on behind v" << who);
+                    } else if (static_cast<std::ptrdiff_t>(i) < who) {
+                        BOOST_TEST(last[i].where.v > 20, "v" << i << " stopped, ahead of v" << who);
+                    }
+                }
+                if (who < 9) {
+                    const auto behind = platoon::name_of(static_cast<std::size_t>(who) + 1);
+                    BOOST_TEST((modes[behind] == (fitted ? platoon::role::radar : platoon::role::fallback)));
+                }
+            }
+        }
+    }
 }
 
 } // namespace
@@ -61,46 +105,96 @@ BOOST_AUTO_TEST_CASE(late_updates_do_no_harm) {
     BOOST_TEST(result.least_gap > 8);
 }
 
-// If any vehicle falls silent at any time, those behind it stop, those ahead continue, and none of them collides with
-// another. A vehicle without a driver may collide if those ahead brake harder than its own brakes do by themselves;
-// that is not tested.
-BOOST_AUTO_TEST_CASE(whoever_vanishes_nobody_with_a_driver_collides) {
-    for (const std::ptrdiff_t who : {0, 1, 5, 8, 9}) {
-        for (const double at : {2.0, 5.5, 7.0, 12.0}) {
-            for (const double hz : {10.0, 50.0}) {
-                auto what = with(hz, 0.1);
-                what.vehicles = 10;
-                what.vanish = who;
-                what.vanish_at = at;
-                what.seconds = 40;
-                std::map<std::string, platoon::role> modes;
-                what.on_change = [&](double, const std::string& vehicle, platoon::role mode, const std::string&) {
-                    modes[vehicle] = mode;
-                };
-                std::vector<platoon::motion> last;
-                double least = what.setup.spacing;
-                simulate(what, [&](double, const auto& where) {
-                    last = where;
-                    for (std::size_t i = 1; i < where.size(); ++i) {
-                        if (static_cast<std::ptrdiff_t>(i) != who) {
-                            least = std::min(least, where[i - 1].x - where[i].x - what.setup.limits.length);
-                        }
-                    }
-                });
-                BOOST_TEST(least > 0, "v" << who << " at " << at << " s, " << hz << " Hz: " << least);
-                for (std::size_t i = 0; i < last.size(); ++i) {
-                    if (static_cast<std::ptrdiff_t>(i) > who) {
-                        BOOST_TEST(last[i].v < 0.5, "v" << i << " drives on behind v" << who);
-                    } else if (static_cast<std::ptrdiff_t>(i) < who) {
-                        BOOST_TEST(last[i].v > 20, "v" << i << " stopped, ahead of v" << who);
-                    }
-                }
-                if (who < 9) {
-                    const auto behind = platoon::name_of(static_cast<std::size_t>(who) + 1);
-                    BOOST_TEST((modes[behind] == platoon::role::fallback));
-                }
+BOOST_AUTO_TEST_CASE(whoever_vanishes_nobody_with_a_driver_collides) { drive_while_one_vanishes(false); }
+
+BOOST_AUTO_TEST_CASE(with_radars_too) { drive_while_one_vanishes(true); }
+
+BOOST_AUTO_TEST_CASE(with_a_radar_losses_in_bursts_cause_no_fallback) {
+    auto what = with(10, 0);
+    what.losses = platoon::losses_of(0.2, 5);
+    for (const bool fitted : {false, true}) {
+        what.setup.radar.fitted = fitted;
+        std::map<platoon::role, int> modes;
+        what.on_change = [&](double, const std::string&, platoon::role mode, const std::string&) { ++modes[mode]; };
+        const auto result = simulate(what);
+        BOOST_TEST(!result.collision);
+        BOOST_TEST((modes[platoon::role::fallback] > 0) == !fitted);
+        BOOST_TEST((modes[platoon::role::radar] > 0) == fitted);
+    }
+}
+
+// Nobody receives anything from the fifth second on, just before the leader brakes.
+BOOST_AUTO_TEST_CASE(with_the_radar_alone_they_keep_a_time_gap) {
+    auto what = with(25, 0);
+    what.vehicles = 6;
+    what.seconds = 60;
+    what.setup.plan.brake_at = 30;
+    for (std::size_t i = 0; i + 1 < what.vehicles; ++i) {
+        what.incidents.push_back({platoon::incident::mute, i, 2});
+    }
+    std::vector<double> gaps;
+    const auto result = simulate(what, [&](double now, const auto& all) {
+        if (now > 29.5 && gaps.empty()) {
+            for (std::size_t i = 1; i < all.size(); ++i) {
+                gaps.push_back(all[i].distance - what.setup.limits.length);
             }
         }
+    });
+    BOOST_TEST(!result.collision);
+    for (const double gap : gaps) { // 5 m and 1.5 s, once all have opened their gaps
+        BOOST_TEST(gap > 25);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(one_merges_in_the_middle) {
+    auto what = with(25, 0.1);
+    what.vehicles = 6;
+    what.seconds = 60;
+    what.setup.plan.brake_at = 100;
+    what.incidents = {{platoon::incident::merge, 2, 2}};
+    double entered = 0;
+    std::vector<platoon::sighting> last;
+    const auto result = simulate(what, [&](double now, const auto& all) {
+        last = all;
+        if (entered == 0 && all.size() == 7 && all[6].in_lane) {
+            entered = now;
+        }
+    });
+    BOOST_TEST(entered > 5);
+    BOOST_TEST(entered < 25);
+    BOOST_TEST(result.least_gap > 7);
+    for (std::size_t i = 1; i < last.size(); ++i) {
+        BOOST_TEST(std::abs(last[i].distance - 15) < 0.2, "v" << i);
+    }
+    BOOST_TEST(last[2].where.x > last[6].where.x);
+    BOOST_TEST(last[6].where.x > last[3].where.x);
+}
+
+BOOST_AUTO_TEST_CASE(a_platoon_splits) {
+    auto what = with(25, 0.1);
+    what.vehicles = 6;
+    what.seconds = 60;
+    what.setup.plan.brake_at = 40; // the second platoon brakes too, by its leader's radar
+    what.incidents = {{platoon::incident::split, 3, 2}};
+    std::vector<platoon::sighting> before;
+    const auto result = simulate(what, [&](double now, const auto& all) {
+        if (now < 39) {
+            before = all;
+        }
+    });
+    BOOST_TEST(result.least_gap > 7);
+    for (std::size_t i = 1; i < before.size(); ++i) {
+        BOOST_TEST(std::abs(before[i].distance - (i == 3 ? 5 + 5 + 1.5 * 25 : 15)) < 2, "v" << i);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(vehicles_may_differ) {
+    auto what = with(25, 0.1);
+    what.differences = {.least_lag = 0.2, .most_lag = 0.5, .least_brake = 5.5, .most_brake = 8};
+    for (what.seed = 1; what.seed <= 5; ++what.seed) {
+        const auto result = simulate(what);
+        BOOST_TEST(result.least_gap > 8);
+        BOOST_TEST(*std::max_element(result.error.begin(), result.error.end()) < 3);
     }
 }
 

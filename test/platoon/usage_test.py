@@ -60,11 +60,20 @@ class Usage(unittest.TestCase):
     def test_wrong_usage(self):
         for arguments in ([], ["fly"], ["run", "--vanish", "x"], ["run", "--vanish", "99@1"], ["run", "--join", "0@1"],
                           ["run", "--hz", "5"], ["run", "--loss", "101"], ["simulate", "--vehicles", "1"],
-                          ["simulate", "--vanish", "3@"], ["vehicle"],
+                          ["simulate", "--vanish", "3@"], ["simulate", "--mute", "1@2+x"],
+                          ["simulate", "--loss", "60", "--burst", "1.2"], ["simulate", "--no-radar", "--split", "1@2"],
+                          ["simulate", "--lags", "0.5", "0.2"], ["vehicle"],
                           ["vehicle", "--name", "v1", "--lead", "--ahead", "v0"]):
             code, out, err = run(*arguments)
             self.assertEqual((code, out), (2, ""), arguments)
             self.assertNotEqual(err, "", arguments)
+
+    def test_the_search_of_gains_ends_with_the_best(self):
+        code, out, err = run("tune", "--vehicles", 3, "--hz", 10, "--loss", 10, "--seeds", 1, "--seconds", 12)
+        self.assertEqual((code, err), (0, ""))
+        costs = [float(line.rpartition(" ")[2]) for line in out.splitlines()]
+        self.assertRegex(out, r"^start +q1 1\.\d+, .*\n(better +q1 .*\n)*best +q1 .*\n$")
+        self.assertEqual(costs, sorted(costs, reverse=True))
 
     def test_a_record_that_cannot_be_written(self):
         code, _, err = run("simulate", "--vehicles", 2, "--record", "/nowhere/record.json")
@@ -77,7 +86,7 @@ class Usage(unittest.TestCase):
                          (5, "", "cles-platoon: cannot write /nowhere/record.json: No such file or directory\n"))
         code, out, err = run(*where, "/dev/full")
         self.assertEqual((code, err), (5, "cles-platoon: cannot write /dev/full: No space left on device\n"))
-        self.assertRegex(out, r"(?m)^gap +\d+\.\d{3} m at least\nfallback")
+        self.assertRegex(out, r"(?m)^gap +\d+\.\d{3} m at least\nradar")
         self.assertRegex(out, r"(?m)^latency   p50 \d")
 
     def test_on_a_terminal_it_shows_a_table(self):

@@ -131,7 +131,8 @@ BOOST_AUTO_TEST_CASE(nothing_but_the_pinned_file_is_loaded_while_another_takes_i
             const auto opened = open(pin);
             BOOST_REQUIRE(name_of(opened) == "sound");
             ++loaded;
-        } catch (const pin_error&) {
+        } catch (const plugin_error& e) {
+            BOOST_REQUIRE(e.key() == "sha256");
             ++refused;
         }
     }

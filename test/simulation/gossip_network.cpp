@@ -75,20 +75,20 @@ class gossip_network::member final : public place,
     }
     [[nodiscard]] std::size_t others() const override { return others_known.size(); }
 
-    void ask(std::uint64_t ticket, std::string_view at, const core::table_question& what) override {
-        post(at, {.what = message::kind::ask,
-                  .ticket = ticket,
-                  .text = std::string{what.since},
-                  .describe = std::string{what.describe}});
+    void ask(std::uint64_t ticket, const destination& at, const core::table_question& what) override {
+        post(at.url, {.what = message::kind::ask,
+                      .ticket = ticket,
+                      .text = std::string{what.since},
+                      .describe = std::string{what.describe}});
         // If no reply arrives, the link's own code reports that at the deadline.
         net.deliver(net.time_.now() + core::gossip::limit, host(),
                     {.what = message::kind::failure, .to_run = run_number, .ticket = ticket});
     }
-    void ask_description(std::uint64_t, std::string_view) override {} // all nodes here know `since`
-    void push(std::string_view at, std::string_view table) override {
-        post(at, {.what = message::kind::push, .text = std::string{table}});
+    void ask_description(std::uint64_t, const destination&) override {} // all nodes here know `since`
+    void push(const destination& at, std::string_view table) override {
+        post(at.url, {.what = message::kind::push, .text = std::string{table}});
     }
-    void release(std::string_view) override {}
+    void release(const destination&) override {}
 
     void on_peer(std::string_view node, core::membership::change what, std::string_view where) override {
         const auto about = net.by_url_.find(where);

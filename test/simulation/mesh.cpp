@@ -6,11 +6,17 @@
 
 #include "node/membership/gossip.hpp"
 #include "simulation/world/node_hosts.hpp"
+#if CLES_SIMULATION_SECURED
+#include "simulation/secured/host_security.hpp"
+#include "simulation/secured/seeded_sodium.hpp"
+#include "simulation/secured/virtual_fleet.hpp"
+#endif
 
 #include <algorithm>
 #include <map>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -34,6 +40,12 @@ class mesh final : public node_hosts {
           links_(graph::of(setup.form, setup.nodes, setup.mean_degree, chance_)), all_links_(links_) {
         if (!setup.declared) {
             net_.connect_only([this](unsigned a, unsigned b) { return all_links_.has(a, b); });
+        }
+        for (unsigned host = 0; host < links_.size(); ++host) {
+            names_.push_back(mesh_name(host));
+        }
+        if (setup_.secured) {
+            found_fleet(seed);
         }
         for (unsigned host = 0; host < links_.size(); ++host) {
             start(host);
@@ -65,6 +77,7 @@ class mesh final : public node_hosts {
   private:
     struct asked {
         bool vital = false; ///< has to succeed
+        bool too_far = false;
         int ends = 0;
         bool succeeded = false;
         std::string why{};
@@ -82,6 +95,7 @@ class mesh final : public node_hosts {
             net_, host, ++runs_, mesh_name(host),
             node_run::options{.seed = chance_.next(),
                               .routing = fault() == planted::route_withheld && host == 1 ? nullptr : cles::routing(),
+                              .security = security_of(host),
                               .gossip = cles::gossip(seeds, states_links() ? names : std::vector<std::string>{})});
         nodes_[host] = n;
         const auto serve = [this](const request& r, const std::shared_ptr<core::call>& c) {
@@ -92,34 +106,72 @@ class mesh final : public node_hosts {
         n->start();
     }
 
+    core::reachability& reach_of(unsigned host) { return node(host)->node()->gossip_responder->reach(); }
+
     [[nodiscard]] bool states_links() const noexcept { return setup_.declared && fault() != planted::links_ignored; }
+
+#if CLES_SIMULATION_SECURED
+    void found_fleet(std::uint64_t seed) {
+        net_.secure();
+        sodium_.emplace(seed);
+        fleet_.emplace(names_);
+        for (unsigned host = 0; host < links_.size(); ++host) {
+            fleet_->set_rights(host, {.forwards = { "*" }});
+        }
+        for (unsigned host = 0; host < links_.size(); ++host) {
+            fleet_->give(host);
+        }
+    }
+    std::shared_ptr<simulated_security> security_of(unsigned host) {
+        return fleet_ ? std::make_shared<host_security>(fleet_->directory_of(host), fault()) : nullptr;
+    }
+#else
+    static void found_fleet(std::uint64_t) { throw std::runtime_error{"this simulation is built without security"}; }
+    static std::shared_ptr<simulated_security> security_of(unsigned) { return nullptr; }
+#endif
 
     // -- routes ----------------------------------------------------------------------------------------------------
 
-    /// How many routes differ from the shortest.
-    std::size_t wrong_routes() {
+    /// How many routes of that node differ from the shortest.
+    std::size_t wrong_routes_of(unsigned host) {
+        if (node(host) == nullptr) {
+            return 0;
+        }
+        auto& routes = reach_of(host);
+        const auto far = links_.distances(host);
         std::size_t wrong = 0;
-        for (const auto& [host, n] : nodes_) {
-            if (!n) {
-                continue;
-            }
-            const auto far = links_.distances(host);
-            for (unsigned other = 0; other < links_.size(); ++other) {
-                if (other == host || node(other) == nullptr) {
-                    continue;
-                }
-                const auto hops = n->node()->gossip_responder->reach().hops_to(mesh_name(other));
-                wrong += hops != far[other] ? 1 : 0;
+        for (unsigned other = 0; other < links_.size(); ++other) {
+            if (other != host && node(other) != nullptr) {
+                wrong += routes.hops_to(names_[other]) != far[other] ? 1 : 0;
                 report_.longest = std::max(report_.longest, far[other].value_or(0));
             }
         }
         return wrong;
     }
 
+    std::size_t wrong_routes() {
+        std::size_t wrong = 0;
+        for (unsigned host = 0; host < links_.size(); ++host) {
+            wrong += wrong_routes_of(host);
+        }
+        return wrong;
+    }
+
+    // Begins with the node that had a wrong route the last time, so that waiting costs little.
+    bool are_all_shortest() {
+        for (unsigned checked = 0; checked < links_.size(); ++checked) {
+            if (wrong_routes_of(next_checked_) != 0) {
+                return false;
+            }
+            next_checked_ = (next_checked_ + 1) % links_.size();
+        }
+        return true;
+    }
+
     milliseconds pass_until_shortest() {
         const auto limit = seconds{60};
         const auto begun = time_.now();
-        while (wrong_routes() != 0) {
+        while (!are_all_shortest()) {
             if (time_.now() - begun > limit) {
                 watcher_.broken(rule::routes_found, std::to_string(wrong_routes()) + " routes are not the shortest");
                 break;
@@ -173,37 +225,54 @@ class mesh final : public node_hosts {
         std::vector<unsigned> on_it{ends.first};
         for (std::string via; on_it.back() != ends.second && on_it.size() < core::route_table::max_hops;) {
             const auto at = on_it.back();
-            const auto hop = node(at)->node()->gossip_responder->reach().next_hop_to(mesh_name(ends.second), via);
+            const auto hop = reach_of(at).next_hop_to(names_[ends.second], via);
             if (hop.empty() || !links_.has(at, host_of(hop))) {
                 break;
             }
             on_it.push_back(host_of(hop));
-            via.append(via.empty() ? "" : ",").append(mesh_name(at));
+            via.append(via.empty() ? "" : ",").append(names_[at]);
         }
         return on_it;
     }
 
+    /// The pairs whose requests are sent over that link.
     std::vector<pair_of_hosts> pairs_over(unsigned a, unsigned b) {
         std::vector<pair_of_hosts> found;
-        for (unsigned from = 0; from < links_.size(); ++from) {
-            for (unsigned to = 0; to < links_.size(); ++to) {
-                const auto on_it = from == to ? std::vector<unsigned>{} : way({from, to});
-                for (std::size_t i = 1; i < on_it.size(); ++i) {
-                    if (std::minmax(on_it[i - 1], on_it[i]) == std::minmax(a, b)) {
+        for (unsigned to = 0; to < links_.size(); ++to) {
+            if (next_hop(a, to) != b && next_hop(b, to) != a) {
+                continue;
+            }
+            std::vector<unsigned> next;
+            for (unsigned from = 0; from < links_.size(); ++from) {
+                next.push_back(next_hop(from, to));
+            }
+            for (unsigned from = 0; from < links_.size(); ++from) {
+                auto at = from;
+                for (unsigned i = 0; at != to && next[at] != at && i < core::route_table::max_hops; ++i) {
+                    if (std::minmax(at, next[at]) == std::minmax(a, b)) {
                         found.emplace_back(from, to);
+                        break;
                     }
+                    at = next[at];
                 }
             }
         }
         return found;
     }
 
+    /// The host itself if there is none.
+    unsigned next_hop(unsigned host, unsigned to) {
+        const auto hop = host == to ? std::string{} : reach_of(host).next_hop_to(names_[to], {});
+        return hop.empty() || !links_.has(host, host_of(hop)) ? host : host_of(hop);
+    }
+
     // Until a request between any of them would have got there for the rest of the second interval.
     void pass_until_rerouted(std::vector<pair_of_hosts> cut, time_point begun) {
+        const auto step = std::max(milliseconds{20}, interval() / 100);
         auto last = milliseconds{0};
         std::size_t late = 0;
         while (time_.now() < begun + 2 * interval()) {
-            pass(milliseconds{20});
+            pass(step);
             const auto took = std::chrono::duration_cast<milliseconds>(time_.now() - begun);
             const auto lost =
                 std::ranges::count_if(cut, [this](const auto& ends) { return way(ends).back() != ends.second; });
@@ -286,12 +355,14 @@ class mesh final : public node_hosts {
         const auto op = ++last_op_;
         auto& a = asked_[op];
         a.vital = vital;
+        a.too_far = links_.distances(from)[to].value_or(0) > setup_.hops + 1;
         auto& n = *node(from);
         n.run([&] {
             n.ask(to, carrier::name,
                   {.verb = verb::delegate,
                    .noun = mesh_name(to) + ":work/" + std::to_string(op),
-                   .deadline = request_limit},
+                   .deadline = request_limit,
+                   .hops = setup_.hops},
                   when_ended(
                       [&a](std::string_view) {
                           ++a.ends;
@@ -314,8 +385,12 @@ class mesh final : public node_hosts {
             if (a.ran > 1) {
                 watcher_.broken(rule::effects_once, request + " ran " + std::to_string(a.ran) + " times");
             }
-            if (a.vital && !a.succeeded) {
+            if (a.vital && !a.too_far && !a.succeeded) {
                 watcher_.broken(rule::asks_succeed, request + " failed: " + a.why);
+            }
+            if (a.vital && a.too_far && a.why.find("permits no more: state hops=") == std::string::npos) {
+                watcher_.broken(rule::replies_match,
+                                request + " went too far, or its failure does not say so: " + a.why);
             }
             ++report_.asked;
             report_.answered += a.succeeded ? 1 : 0;
@@ -339,6 +414,12 @@ class mesh final : public node_hosts {
     const mesh_setup setup_;
     graph links_;
     const graph all_links_;
+    std::vector<std::string> names_;
+#if CLES_SIMULATION_SECURED
+    std::optional<seeded_sodium> sodium_;
+    std::optional<virtual_fleet> fleet_;
+#endif
+    unsigned next_checked_ = 0;
     std::map<std::uint32_t, asked> asked_;
     std::uint32_t last_op_ = 0;
     unsigned runs_ = 0;

@@ -21,6 +21,8 @@ struct mesh_setup {
     unsigned cuts = 3;        ///< links that are lost, one after another, each of which leaves the mesh connected
     unsigned crashes = 1;
     unsigned requests = 200; ///< after each change
+    unsigned hops = 8;       ///< of each request, which must not arrive over more than one link more
+    bool secured = false;    ///< they are members of a fleet, and all may forward
 };
 
 /// The result of a simulated mesh.

@@ -44,6 +44,11 @@ BOOST_AUTO_TEST_CASE(a_line) { hold(1, {.form = mesh_form::line, .nodes = 6, .cu
 BOOST_AUTO_TEST_CASE(a_ring) { hold(2, {.form = mesh_form::ring, .nodes = 8, .cuts = 1}); }
 BOOST_AUTO_TEST_CASE(a_star) { hold(3, {.form = mesh_form::star, .nodes = 8, .cuts = 0}); }
 BOOST_AUTO_TEST_CASE(a_grid) { hold(4, {.form = mesh_form::grid, .nodes = 16}); }
+// Requests over more links than they may be forwarded fail, and say how many it takes.
+BOOST_AUTO_TEST_CASE(a_line_of_twelve) { hold(5, {.form = mesh_form::line, .nodes = 12, .cuts = 0}); }
+BOOST_AUTO_TEST_CASE(a_line_that_takes_more_hops) {
+    hold(6, {.form = mesh_form::line, .nodes = 16, .cuts = 0, .crashes = 0, .hops = 15});
+}
 BOOST_AUTO_TEST_CASE(random_meshes) {
     for (std::uint64_t seed = 1; seed <= (is_slow ? 2 : 10); ++seed) {
         hold(seed, {.nodes = 20});
@@ -59,6 +64,20 @@ BOOST_AUTO_TEST_CASE(links_that_cannot_be_opened_need_not_be_declared) {
         hold(seed, {.nodes = 12, .declared = false});
     }
 }
+
+#if CLES_SIMULATION_SECURED
+BOOST_AUTO_TEST_CASE(a_line_with_security) {
+    hold(1, {.form = mesh_form::line, .nodes = 6, .cuts = 0, .secured = true});
+}
+BOOST_AUTO_TEST_CASE(a_ring_with_security) {
+    hold(2, {.form = mesh_form::ring, .nodes = 8, .cuts = 1, .secured = true});
+}
+BOOST_AUTO_TEST_CASE(random_meshes_with_security) {
+    for (std::uint64_t seed = 1; seed <= (is_slow ? 1 : 4); ++seed) {
+        hold(seed, {.nodes = 20, .secured = true});
+    }
+}
+#endif
 
 BOOST_AUTO_TEST_CASE(a_link_that_must_not_be_is_found) { finds(planted::links_ignored, rule::links_kept); }
 BOOST_AUTO_TEST_CASE(a_node_that_forwards_nothing_is_found) { finds(planted::route_withheld, rule::routes_found); }

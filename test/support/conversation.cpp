@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
+#include <cles/tracing.hpp>
 
 #include "protocol/grammar.hpp"
 
@@ -112,7 +113,9 @@ void conversation::make_node() {
     if (node_) {
         return;
     }
-    node_ = std::make_unique<test_node>(bounds, [](const access& wanted) { return wanted.task != "secret"; });
+    node_ = std::make_unique<test_node>(
+        bounds, [](const access& wanted) { return wanted.task != "secret"; }, log_sink{},
+        core::completion_queue::runner{}, std::shared_ptr<core::node_security>{}, tracing());
     add_quick_tasks();
     add_later_tasks();
 }

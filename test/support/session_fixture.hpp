@@ -28,7 +28,8 @@ namespace cles::test {
 class test_node {
   public:
     explicit test_node(limits bounds = {}, authoriser rules = {}, log_sink log = {},
-                       core::completion_queue::runner complete = {}, std::shared_ptr<core::node_security> security = {})
+                       core::completion_queue::runner complete = {}, std::shared_ptr<core::node_security> security = {},
+                       const detail::tracing_part* tracing = nullptr)
         : host(std::make_shared<core::node_state>(core::node_options{.name = "car1",
                                                                      .epoch = 0x5f3a09c1,
                                                                      .first_datagram_id = first_datagram_id,
@@ -36,6 +37,7 @@ class test_node {
                                                                      .authorise = std::move(rules),
                                                                      .security = std::move(security),
                                                                      .secured = &core::make_secured_protocol,
+                                                                     .tracing = tracing,
                                                                      .log = std::move(log),
                                                                      .complete = std::move(complete)},
                                                   clock, [this] { ++wakes; })) {}

@@ -24,6 +24,7 @@ void feed_arguments::add_options(CLI::App& command, const std::string& count_hel
     command.add_option("--keep", keep, "Updates that the publisher queues if this subscriber is slow (default 64)")
         ->type_name("N")
         ->check(CLI::Range(1, 65536).description(""));
+    add_hops(command, hops);
 }
 
 bool feed_arguments::is_multicast() const {
@@ -45,7 +46,7 @@ cles::bind_options feed_arguments::options(const client& requester) const {
     }
     const auto call = requester.options_for(noun, timeout);
     cles::bind_options out;
-    out.at(call.at_).deadline(call.deadline_).every(every);
+    out.at(call.at_).deadline(call.deadline_).hops(hops).every(every);
     if (keep != 0) {
         out.keep(keep);
     }

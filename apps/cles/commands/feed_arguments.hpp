@@ -27,6 +27,7 @@ struct feed_arguments {
     std::chrono::milliseconds every{0};
     std::chrono::milliseconds duration{0};
     std::uint32_t keep = 0;
+    std::uint32_t hops = 8;
     std::uint64_t count = 0;
 
     void add_options(CLI::App& command, const std::string& count_help);

@@ -4,6 +4,7 @@
 #include <cles/verb.hpp>
 
 #include "client/client.hpp"
+#include "client/routed_request.hpp"
 #include "commands.hpp"
 #include "discovery/find_nodes.hpp"
 #include "options/arguments.hpp"
@@ -16,7 +17,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
@@ -40,42 +40,14 @@ struct request_arguments {
     output_format format = output_format::automatic;
     bool progress = false;
     bool urgent = false;
+    std::uint32_t hops = 8;
 };
-
-// The node does not route or cannot be reached: another one may.
-bool is_refused_by_router(const cles::error& e) {
-    return e.code() == cles::errc::no_target || e.code().category() != cles::error_category();
-}
-
-// Sends the request to the first node that routes, if one has to be found: the others refuse it before they begin.
-asio::awaitable<cles::json_text> send_request(client& requester, const std::string& command,
-                                              cles::call_options& options, std::vector<std::string>& routers) {
-    std::exception_ptr first_failure; // of the most likely router
-    const auto candidates = std::exchange(routers, {});
-    for (const auto& url : candidates) {
-        options.at(url); // and of all further requests, if it answers
-        try {
-            cles::json_text answer = co_await requester.node().async_request(command, options);
-            co_return answer;
-        } catch (const cles::error& e) {
-            if (!is_refused_by_router(e)) {
-                throw;
-            }
-            first_failure = first_failure ? first_failure : std::current_exception();
-        }
-    }
-    if (first_failure) {
-        std::rethrow_exception(first_failure);
-    }
-    cles::json_text answer = co_await requester.node().async_request(command, options);
-    co_return answer;
-}
 
 asio::awaitable<void> send_all(client& requester, const request_arguments& args, std::string command) {
     printer out{args.format, args.count != 1};
     progress_line progress{args.progress};
     auto options = requester.options_for(args.noun, args.timeout);
-    options.urgent(args.urgent);
+    options.urgent(args.urgent).hops(args.hops);
     if (args.verb == cles::verb::delegate && progress.is_wanted()) {
         options.on_progress(
             [&progress](double fraction, std::string_view details) { progress.show(fraction, details); });
@@ -91,7 +63,7 @@ asio::awaitable<void> send_all(client& requester, const request_arguments& args,
             next += args.interval;
             co_await requester.sleep_until(next);
         }
-        const cles::json_text answer = co_await send_request(requester, command, options, routers);
+        const cles::json_text answer = co_await send_routed(requester, command, options, routers);
         progress.clear();
         out.print(answer.text);
     }
@@ -118,6 +90,7 @@ void add_request(CLI::App& app, context& shared, cles::verb verb, const std::str
     add_timeout(*command, args->timeout, verb == cles::verb::delegate ? "30s" : "5s");
     add_count(*command, args->count, "Number of requests; 0: until interrupted (default 1)");
     add_duration(*command, "-i,--interval", args->interval, "Time between requests; 0: no pause (default 1s)");
+    add_hops(*command, args->hops);
     add_output_option(*command, args->format);
     if (verb != cles::verb::update) {
         command->add_flag("--urgent", args->urgent, "Have the node send the reply before others that are queued");

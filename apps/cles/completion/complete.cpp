@@ -87,11 +87,19 @@ class live_search {
         }
         const auto node = cursor_.typed.substr(0, colon);
         const auto command = cursor_.command->get_name();
-        const auto verb = command == "hz" ? cles::verb::bind : cles::verb_from(command);
+        const auto verb = command == "hz" ? cles::verb::bind : cles::verb_from(command == "trace" ? traced() : command);
         if (!verb || (node != "self" && has_no_nodes())) {
             return {};
         }
         return ask([&](client& requester) { return live_nouns(requester, addresses_, node, *verb, until_); });
+    }
+
+    /// The verb in `cles trace VERB NOUN`.
+    [[nodiscard]] std::string traced() const {
+        const auto& words = cursor_.words;
+        const auto found =
+            std::find_if(words.begin(), words.end(), [](const auto& word) { return cles::verb_from(word); });
+        return found == words.end() ? std::string{} : *found;
     }
 
     candidates names(const std::string& suffix) {

@@ -40,6 +40,12 @@ void add_count(CLI::App& command, std::uint64_t& count, const std::string& help)
         ->type_name("N");
 }
 
+void add_hops(CLI::App& command, std::uint32_t& most) {
+    command.add_option("--hops", most, "How many nodes may forward the request (default 8, at most 16)")
+        ->type_name("N")
+        ->check(CLI::Range(0, 16).description(""));
+}
+
 void add_duration(CLI::App& command, const std::string& name, std::chrono::milliseconds& span,
                   const std::string& help) {
     command

@@ -21,6 +21,9 @@ void add_timeout(CLI::App& command, std::optional<std::chrono::milliseconds>& li
 /// -n, --count
 void add_count(CLI::App& command, std::uint64_t& count, const std::string& help);
 
+/// --hops: how many nodes may forward a request.
+void add_hops(CLI::App& command, std::uint32_t& most);
+
 /// An option whose value is a duration; 0 is allowed.
 void add_duration(CLI::App& command, const std::string& name, std::chrono::milliseconds& span, const std::string& help);
 

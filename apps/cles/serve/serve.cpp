@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/run.hpp>
+#include <cles/tracing.hpp>
 #include <cles/wake_bound.hpp>
 
 #include "client/logging.hpp"
@@ -70,6 +71,7 @@ cles::service_options options_of(const serve_arguments& args, const cles::log_si
     options.insecure = args.insecure;
     options.networks = args.networks;
     options.multicast = args.multicast.group(!keys.empty());
+    options.tracing = cles::tracing();
     options.log = log;
     return options;
 }

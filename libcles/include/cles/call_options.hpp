@@ -18,25 +18,22 @@ class call_options {
 
     /// How long to wait for the reply; also sent to the peer. 0: the protocol's default (5 s, DELEGATE 30 s). More than
     /// a day counts as a day; negative values are refused.
-    call_options& deadline(std::chrono::milliseconds limit) {
-        deadline_ = limit;
-        return *this;
-    }
+    call_options& deadline(std::chrono::milliseconds limit);
     /// The URL to send it to, instead of looking up the target's name.
     call_options& at(std::string_view url);
     /// Marks a small request that must not wait behind large ones: it uses a separate link, and its reply is sent
     /// before others that wait at the peer. A peer that does not know the adverb `urgent` sends the reply in the normal
     /// order.
-    call_options& urgent(bool value = true) {
-        urgent_ = value;
-        return *this;
-    }
+    call_options& urgent(bool value = true);
+    /// How many nodes may forward the request: 0 to 16. A node between this one and the target counts as one; if this
+    /// node sends it to its own router, that counts too. Larger values are refused.
+    call_options& hops(std::uint32_t most);
+    /// Makes the request part of a trace: "00-<32 hex digits>-<16 hex digits>-<2 hex digits>" (W3C `traceparent`), such
+    /// as `request::trace()` of the request that causes this one. Text of another form is refused. Not for bindings.
+    call_options& trace(std::string_view parent);
     /// Receives the peer's error message if the request fails. It is written before the request completes, and must
     /// outlive the request.
-    call_options& diagnostics(std::string& text) {
-        diagnostics_ = &text;
-        return *this;
-    }
+    call_options& diagnostics(std::string& text);
     /// Called for each progress report of a DELEGATE, with a fraction from 0 to 1 and a JSON object. Runs inline on the
     /// service's executor. Makes the request ask the peer for reports.
     call_options& on_progress(std::function<void(double, std::string_view)> callback);
@@ -44,6 +41,8 @@ class call_options {
     std::chrono::milliseconds deadline_{0};
     std::string at_{};
     bool urgent_ = false;
+    std::uint32_t hops_ = 8;
+    std::string trace_{};
     std::string* diagnostics_ = nullptr;
     std::function<void(double, std::string_view)> on_progress_{};
 };
@@ -61,10 +60,7 @@ class bind_options : public call_options {
     }
     /// How many updates the publisher queues while this subscriber is slow: 1 to 65536; 0: the protocol's default, 64.
     /// Larger values are refused.
-    bind_options& keep(std::uint32_t updates) {
-        keep_ = updates;
-        return *this;
-    }
+    bind_options& keep(std::uint32_t updates);
     /// Binds through the multicast group instead of a link, so that the publisher sends one datagram for all such
     /// subscribers; `all:` does so by default if the service has no routing. `every` and `keep` then have no effect,
     /// and there is no reply: the feed begins with the publisher's last value as an update, and a missing publisher is
@@ -75,6 +71,7 @@ class bind_options : public call_options {
     }
     bind_options& deadline(std::chrono::milliseconds limit);
     bind_options& at(std::string_view url);
+    bind_options& hops(std::uint32_t most);
     bind_options& diagnostics(std::string& text);
 
     std::chrono::milliseconds every_{0};

@@ -34,7 +34,7 @@ extern "C" {
 #endif
 
 #define CLES_PLUGIN_ABI_MAJOR 1u
-#define CLES_PLUGIN_ABI_MINOR 3u
+#define CLES_PLUGIN_ABI_MINOR 4u
 /* The name of the entry point, as text. */
 #define CLES_PLUGIN_ENTRY "cles_plugin_v1"
 
@@ -80,6 +80,9 @@ typedef struct cles_request {
     int64_t peer_uid;         /* of the process, if the kernel reports it; otherwise -1 */
     int32_t peer_local;       /* 1: on this host */
     int32_t reserved;
+    /* Since 1.4: the trace that the request belongs to, as a W3C traceparent; empty if there is none. Requests that the
+     * job sends with `delegate` belong to it, too. */
+    cles_text trace;
 } cles_request;
 
 /* The task may run twice without harm, so that another node can replace one that was lost meanwhile. */

@@ -76,7 +76,8 @@ class plugin_task {
                                 .peer = &peer,
                                 .deadline = asked.left_ns == 0
                                                 ? time_point{}
-                                                : time_point::clock::now() + std::chrono::nanoseconds{asked.left_ns}};
+                                                : time_point::clock::now() + std::chrono::nanoseconds{asked.left_ns},
+                                .trace = view_of(asked.trace)};
         const request what{data};
         if (task.plain) {
             std::string result;

@@ -31,6 +31,7 @@ struct request_data {
     std::string_view body = "{}";
     const identity* peer = nullptr;
     time_point deadline{};
+    std::string_view trace{};
 };
 
 /// Makes a copy that owns its text.
@@ -76,6 +77,8 @@ class request {
     [[nodiscard]] const identity& peer() const noexcept { return *data_->peer; }
     /// When the requester stops waiting.
     [[nodiscard]] time_point deadline() const noexcept { return data_->deadline; }
+    /// The trace that it belongs to, for `call_options::trace` of the requests that it causes; empty if there is none.
+    [[nodiscard]] std::string_view trace() const noexcept { return data_->trace; }
 
     /// The parameter at `index` (from 0) as text or a number.
     /// \throws cles::error with `bad_request` if it is missing, not a number or out of range

@@ -44,6 +44,7 @@ class call_control {
     [[nodiscard]] virtual bool stopped() const noexcept = 0;
     virtual void delegate(std::string_view command, const call_options& options, answer_callback answered) = 0;
     virtual void log(log_level level, std::string_view text) = 0;
+    virtual void record_times(std::chrono::nanoseconds /*queued*/, std::chrono::nanoseconds /*ran*/) {}
     /// \throws cles::error with `failed` if there is none, as in a plugin
     [[nodiscard]] virtual boost::asio::any_io_executor executor() const;
     /// Whether any thread may use it.
@@ -117,6 +118,12 @@ class responder {
 
     /// Writes to the service's log.
     void log(log_level level, std::string_view text) const { call_->log(level, text); }
+
+    /// For pools of workers: if the request is traced, adds to the time that it has waited for a worker, and to the
+    /// time that it has held one. Without any call of this, all the time until the reply counts as the latter.
+    void record_times(std::chrono::nanoseconds queued, std::chrono::nanoseconds ran) const {
+        call_->record_times(queued, ran);
+    }
 
     /// The service's executor.
     /// \throws cles::error with `failed` in a plugin

@@ -65,6 +65,7 @@ class security_part;
 /// Adds to a service's environment and to the settings of its node. As a function, it adds less to programs without one
 /// than an object would.
 using service_part = std::function<void(asio_port::asio_environment&, core::node_options&)>;
+struct tracing_part;
 } // namespace detail
 
 /// The configuration of a service. Only the name is required.
@@ -97,6 +98,9 @@ struct service_options {
     /// `cles::routing()` forwards requests of clients to `any:`, `all:` and other nodes (docs/routing.md). If null,
     /// these fail with `no_target`.
     const detail::routing_part* routing = nullptr;
+    /// `cles::tracing()` records how long traced requests take here (<cles/tracing.hpp>). If null, the identity of a
+    /// trace is only passed on.
+    const detail::tracing_part* tracing = nullptr;
     /// Returns the load of this node, which is reported to others and used to balance `any:`. Called often, on the
     /// service's executor, so it must be quick. If empty, the load is the number of unfinished handlers, without a pool
     /// of workers.
@@ -331,6 +335,8 @@ class service : public registrar {
     /// Tasks with many short-lived nouns ("session/17") need not call this: beyond `limits::nouns`, or the memory for
     /// values, nouns without subscribers are retired automatically, least recently used first.
     bool retire(std::string_view noun);
+    /// The same for all nouns of a task. Returns how many values there were.
+    std::size_t retire_all(std::string_view task);
 
     /// Publishes when every subscriber's queue has space, so that nothing is dropped: `void(error_code)`. It completes
     /// when the update is in all queues, in the order of the calls. If it is cancelled earlier, the update is not

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -29,10 +30,10 @@ class job_taker {
     /// Whether no more jobs are wanted.
     [[nodiscard]] virtual bool full() const noexcept = 0;
     /// Whether it takes that job. \param ahead how many jobs start before it. May be called while the queue is locked.
-    [[nodiscard]] virtual bool wants(const core::call& job, std::size_t ahead) = 0;
-    /// Sends a wanted job, which the queue has removed, to the node. Its outcome is passed to the requester.
+    [[nodiscard]] virtual bool choose(const core::call& job, std::size_t ahead) = 0;
+    /// Sends a chosen job, which the queue has removed, to the node. Its outcome is passed to the requester.
     /// \param ended called once, not inside this call: `true` if the node has refused the job before it began, so that
-    /// it belongs into the queue again, at its old place; `false` if it has been answered
+    /// it has to be put back into the queue, at its old place; `false` if it has been answered
     /// \return identifies the job for `job_sharing::withdraw`
     virtual std::uint64_t take(std::shared_ptr<core::call> job, std::string_view body,
                                std::function<void(bool refused)> ended) = 0;
@@ -49,11 +50,16 @@ class shareable_queue {
         std::uint32_t idle = 0;                    ///< workers that will take some of them at once
         std::uint32_t workers = 0;                 ///< that are not stuck
         std::chrono::microseconds service_time{0}; ///< how long a job holds a worker; 0: not known
+        std::uint32_t movable = 0;                 ///< of the waiting jobs, those that `job_sharing::may_move`
+        std::uint64_t movable_queued = 0;          ///< how many such jobs have been queued so far
+        bool draining = false;                     ///< no more jobs are accepted
 
-        /// Workers for which no job waits.
-        [[nodiscard]] std::uint32_t free() const noexcept { return idle > waiting ? idle - waiting : 0; }
-        /// Jobs for which there is no worker.
-        [[nodiscard]] std::uint32_t excess() const noexcept { return waiting > idle ? waiting - idle : 0; }
+        /// Workers for jobs of other nodes: those for which no job waits.
+        [[nodiscard]] std::uint32_t free() const noexcept { return draining || idle < waiting ? 0 : idle - waiting; }
+        /// Jobs for other nodes: those for which there is no worker, if they may move.
+        [[nodiscard]] std::uint32_t excess() const noexcept {
+            return std::min(movable, waiting > idle ? waiting - idle : 0);
+        }
     };
 
     shareable_queue() = default;
@@ -61,8 +67,8 @@ class shareable_queue {
     shareable_queue& operator=(const shareable_queue&) = delete;
 
     [[nodiscard]] virtual state read_state() const = 0;
-    /// Offers jobs that have not started to `to`, in the order in which they will start, and passes to it those that
-    /// it wants. It may end early, so that the queue is not locked for long.
+    /// Offers jobs to `to` that have not started and may move, in the order in which they will start, and passes to it
+    /// those that it chooses. It may end early, so that the queue is not locked for long.
     virtual void offer(job_taker& to) = 0;
 
   protected:
@@ -77,6 +83,8 @@ class job_sharing {
     job_sharing& operator=(const job_sharing&) = delete;
     virtual ~job_sharing() = default;
 
+    /// Whether a job may move to another node; known before it is queued.
+    [[nodiscard]] virtual bool may_move(const core::call& job) const noexcept = 0;
     /// Jobs have been added to the queue, or a worker has become free.
     virtual void on_change() = 0;
     /// The requester of a job that was taken no longer waits: cancels it. `ended` is not called any more.

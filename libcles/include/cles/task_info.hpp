@@ -12,7 +12,9 @@ struct task_info {
     std::vector<std::string> parameters{}; ///< their names, in order
     bool idempotent = false;               ///< running it twice has the same effect as once
     bool inline_ok = false;                ///< in the runtime: quick enough to run on the I/O thread
-    bool local = false;                    ///< its jobs are not moved to other nodes (docs/sharing.md)
+    /// Its jobs are not moved to other nodes, because they need the state, files or devices of this one
+    /// (docs/sharing.md).
+    bool local = false;
     /// Its requests, except BIND, run only with the signature of a member of the fleet, and updates of the task's nouns
     /// are signed. A node without security refuses both with `denied`.
     bool must_be_signed = false;

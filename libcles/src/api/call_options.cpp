@@ -12,8 +12,38 @@ call_options& call_options::on_progress(std::function<void(double, std::string_v
     return *this;
 }
 
+call_options& call_options::deadline(std::chrono::milliseconds limit) {
+    deadline_ = limit;
+    return *this;
+}
+
 call_options& call_options::at(std::string_view url) {
     at_ = url;
+    return *this;
+}
+
+call_options& call_options::urgent(bool value) {
+    urgent_ = value;
+    return *this;
+}
+
+call_options& call_options::hops(std::uint32_t most) {
+    hops_ = most;
+    return *this;
+}
+
+call_options& call_options::trace(std::string_view parent) {
+    trace_ = parent;
+    return *this;
+}
+
+call_options& call_options::diagnostics(std::string& text) {
+    diagnostics_ = &text;
+    return *this;
+}
+
+bind_options& bind_options::keep(std::uint32_t updates) {
+    keep_ = updates;
     return *this;
 }
 
@@ -24,6 +54,11 @@ bind_options& bind_options::deadline(std::chrono::milliseconds limit) {
 
 bind_options& bind_options::at(std::string_view url) {
     call_options::at(url);
+    return *this;
+}
+
+bind_options& bind_options::hops(std::uint32_t most) {
+    call_options::hops(most);
     return *this;
 }
 

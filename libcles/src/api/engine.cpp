@@ -32,6 +32,7 @@ core::local_node_options options_of(service_options&& all, asio_port::asio_envir
                                              .epoch = by.random(),
                                              .bounds = all.limits,
                                              .authorise = std::move(all.authorise),
+                                             .tracing = all.tracing,
                                              .log = std::move(all.log),
                                              .metrics = std::move(all.metrics),
                                              .load = std::move(all.load)},
@@ -101,6 +102,9 @@ class service_call final : public call_control, public std::enable_shared_from_t
             send(*by, command, options, std::move(answered), left);
         }
     }
+    void record_times(std::chrono::nanoseconds queued, std::chrono::nanoseconds ran) override {
+        call_->record_times(queued, ran);
+    }
     void log(log_level level, std::string_view text) override {
         if (const auto by = service_.lock()) { // otherwise the log may be gone too
             call_->write_log(level, text);
@@ -156,6 +160,9 @@ class service_call final : public call_control, public std::enable_shared_from_t
         };
         auto chosen = options;
         chosen.diagnostics(*why);
+        if (const auto& trace = call_->wanted().trace; trace && chosen.trace_.empty()) {
+            chosen.trace(protocol::traceparent_text(trace));
+        }
         using operation = reply_operation<json_text, false, decltype(completed)>;
         const auto ticket = by.send_command(
             command, chosen, pending_ptr{make_operation<operation>(std::move(completed), executor_, why.get())}, left);

@@ -220,7 +220,8 @@ std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std
                          .deadline = options.deadline_,
                          .every_ms = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
                              options.every_.count(), 0, static_cast<std::int64_t>(protocol::max_deadline_ms))),
-                         .keep = options.keep_});
+                         .keep = options.keep_,
+                         .hops = options.hops_});
     return made;
 }
 

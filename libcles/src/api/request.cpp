@@ -24,7 +24,7 @@ struct copy_with_peer {
 } // namespace
 
 void owned_request::assign(const request& what, std::shared_ptr<const identity> peer) {
-    auto size = what.node().size() + what.task().size() + what.body().size();
+    auto size = what.node().size() + what.task().size() + what.body().size() + what.trace().size();
     for (const auto p : what.parameters()) {
         size += p.size();
     }
@@ -40,6 +40,7 @@ void owned_request::assign(const request& what, std::shared_ptr<const identity> 
     data_.node = copy(what.node());
     data_.task = copy(what.task());
     data_.body = copy(what.body());
+    data_.trace = copy(what.trace());
     parameters_.clear();
     parameters_.reserve(what.parameters().size());
     for (const auto p : what.parameters()) {

@@ -193,6 +193,11 @@ bool service::retire(std::string_view noun) {
     return run_on(strand_of(pooled_, get_executor()), [this, noun] { return engine_->node().published.retire(noun); });
 }
 
+std::size_t service::retire_all(std::string_view task) {
+    return run_on(strand_of(pooled_, get_executor()),
+                  [this, task] { return engine_->node().published.retire_all(task); });
+}
+
 template <class Start>
 void service::start_here(const detail::slot_ref& slot, const Start& start) {
     // The ticket is 0 if the operation has completed, or its completion is queued.

@@ -4,7 +4,6 @@
 #include "node/publish/binding.hpp"
 
 #include <algorithm>
-#include <iterator>
 
 namespace cles::core {
 
@@ -21,36 +20,6 @@ void send_updates(unsent_topics& unsent, publications& published, time_point now
     unsent.reuse(std::move(topics));
 }
 
-// Calls `flush` for each link that waits now, without those that are added meanwhile; true: it is done. During the
-// call, it may start to wait again. Links that were not done, or not reached because `flush` threw, wait on.
-template <class F>
-void flush_scheduler::flush_waiting(F&& flush) {
-    auto these = std::exchange(waiting_, std::exchange(spare_, {}));
-    const auto keep_rest = [&] {
-        std::erase(these, nullptr);
-        if (!these.empty()) {
-            std::ranges::move(waiting_, std::back_inserter(these));
-            waiting_.swap(these);
-            these.clear();
-        }
-        spare_ = std::move(these);
-    };
-    try {
-        for (auto& place : these) {
-            auto one = std::exchange(place, nullptr);
-            one->waits_ = false;
-            if (!flush(*one) && !one->waits_) {
-                one->waits_ = true;
-                place = std::move(one);
-            }
-        }
-    } catch (...) {
-        keep_rest();
-        throw;
-    }
-    keep_rest();
-}
-
 void flush_scheduler::schedule_turn() {
     if (!scheduled_ && !host_.stopped()) {
         host_.post_flush();
@@ -63,7 +32,9 @@ void flush_scheduler::flush_soon(flushable& which) {
     if (!which.waits_ && !host_.stopped()) {
         waiting_.push_back(which.share());
         which.waits_ = true;
-        schedule_turn();
+        if (!collecting_) {
+            schedule_turn();
+        }
     }
 }
 

@@ -4,8 +4,10 @@
 #include "node/base/scoped_flag.hpp"
 #include "node/node_state.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -70,6 +72,8 @@ class flushable {
     [[nodiscard]] virtual bool write() = 0;
     /// Whether at most one request of this node waits for its reply here.
     [[nodiscard]] virtual bool has_single_request() = 0;
+    /// The same, and whether no request of the peer is in progress.
+    [[nodiscard]] virtual bool has_single_message() = 0;
     /// Returns a reference that keeps it alive.
     [[nodiscard]] virtual std::shared_ptr<flushable> share() = 0;
 
@@ -105,7 +109,8 @@ class flush_host {
 ///
 /// A single update or request of the program goes out at once, inside the call that makes it: there is nothing to
 /// combine it with, and the caller may do much before the next turn, such as setting a timer. This does not apply while
-/// a handler runs, until it first waits, so that a reply that it gives goes first.
+/// a handler runs, until it first waits, so that a reply that it gives goes first. It also applies to a message that a
+/// node forwards.
 class flush_scheduler {
   public:
     flush_scheduler(flush_host& host, node_state& node) noexcept : host_(host), node_(node) {}
@@ -138,6 +143,28 @@ class flush_scheduler {
         }
         request_flush_if_pending();
     }
+    /// Processes a line of a link, which may have other links send something. That goes out at once if nothing else is
+    /// in progress there, and `may_write` says so. Exceptions propagate.
+    template <class F, class Condition>
+    void run_line(F&& process, Condition&& may_write) {
+        if (scheduled_) {
+            process();
+            return;
+        }
+        try {
+            {
+                const scoped_flag during{collecting_};
+                process();
+            }
+            if (!waiting_.empty() && may_write()) {
+                flush_waiting([](flushable& one) { return one.has_single_message() && one.write(); });
+            }
+        } catch (...) {
+            request_flush_if_pending();
+            throw;
+        }
+        request_flush_if_pending();
+    }
     /// Flushes for the last time. There are no more turns.
     void stop();
 
@@ -145,8 +172,35 @@ class flush_scheduler {
     [[nodiscard]] scoped_flag serving() noexcept { return scoped_flag{serving_}; }
 
   private:
+    /// Calls `flush` for each link that waits now, without those that are added meanwhile; true: it is done. During the
+    /// call, it may start to wait again. Links that were not done, or not reached because `flush` threw, wait on.
     template <class F>
-    void flush_waiting(F&& flush);
+    void flush_waiting(F&& flush) {
+        auto these = std::exchange(waiting_, std::exchange(spare_, {}));
+        const auto keep_rest = [&] {
+            std::erase(these, nullptr);
+            if (!these.empty()) {
+                std::ranges::move(waiting_, std::back_inserter(these));
+                waiting_.swap(these);
+                these.clear();
+            }
+            spare_ = std::move(these);
+        };
+        try {
+            for (auto& place : these) {
+                auto one = std::exchange(place, nullptr);
+                one->waits_ = false;
+                if (!flush(*one) && !one->waits_) {
+                    one->waits_ = true;
+                    place = std::move(one);
+                }
+            }
+        } catch (...) {
+            keep_rest();
+            throw;
+        }
+        keep_rest();
+    }
     void run_turn();
     void write_single_messages();
     /// Hands published updates to their subscribers. Returns the total number so far; nothing if there were none, or if
@@ -159,7 +213,8 @@ class flush_scheduler {
     update_coalescer coalescer_;
     std::vector<std::shared_ptr<flushable>> waiting_;
     std::vector<std::shared_ptr<flushable>> spare_; // empty, reused for its capacity
-    bool scheduled_ = false; // a turn is posted, or is not needed because what waits is handled afterwards
+    bool scheduled_ = false;  // a turn is posted, or is not needed because what waits is handled afterwards
+    bool collecting_ = false; // what waits is handled after the line that is processed
     bool serving_ = false;
 };
 

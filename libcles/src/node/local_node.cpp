@@ -52,15 +52,29 @@ std::string foreign_adverb(std::string_view command) {
     parts.next(); // verb
     parts.next(); // noun
     for (auto part = parts.next(); !part.empty(); part = parts.next()) {
-        if (!part.starts_with("deadline=") && part != "urgent=yes") {
-            return "only the adverbs 'deadline' and 'urgent' are allowed here, not " + protocol::quoted(part);
+        if (!part.starts_with("deadline=") && !part.starts_with("hops=") && part != "urgent=yes") {
+            return "only the adverbs 'deadline', 'hops' and 'urgent' are allowed here, not " + protocol::quoted(part);
         }
     }
     return {};
 }
 
+protocol::carried_adverbs carried_by(const call_options& options) {
+    protocol::carried_adverbs carried{.urgent = options.urgent_};
+    if (!options.trace_.empty()) {
+        carried.trace = protocol::parse_traceparent(options.trace_).value_or(protocol::trace_context{});
+    }
+    return carried;
+}
+
 std::string negative(const char* option, std::chrono::milliseconds value) {
     return std::string{option} + " is " + std::to_string(value.count()) + " ms: must be 0 or more";
+}
+
+std::string invalid_hops_reason(const char* option, std::uint32_t value) {
+    return value <= protocol::max_hops ? std::string{}
+                                       : std::string{option} + " is " + std::to_string(value) + ": must be 0 to " +
+                                             std::to_string(protocol::max_hops);
 }
 
 /// Checks the settings, and adds what a node draws for each incarnation, and who calls its completions.
@@ -85,7 +99,12 @@ node_options complete(node_options setup, const std::shared_ptr<environment>& by
 } // namespace
 
 std::string invalid_option_reason(const call_options& options) {
-    return options.deadline_.count() < 0 ? negative("call_options::deadline", options.deadline_) : std::string{};
+    if (!options.trace_.empty() && !protocol::parse_traceparent(options.trace_)) {
+        return "call_options::trace is " + protocol::quoted(options.trace_) +
+               ": must be 00-<32 hex digits>-<16 hex digits>-<2 hex digits>, the first two not all 0";
+    }
+    return options.deadline_.count() < 0 ? negative("call_options::deadline", options.deadline_)
+                                         : invalid_hops_reason("call_options::hops", options.hops_);
 }
 
 std::string invalid_option_reason(const bind_options& options) {
@@ -99,7 +118,7 @@ std::string invalid_option_reason(const bind_options& options) {
         return "bind_options::keep is " + std::to_string(options.keep_) + ": must be 1 to " +
                std::to_string(protocol::max_keep) + ", or 0 for the default";
     }
-    return {};
+    return invalid_hops_reason("bind_options::hops", options.hops_);
 }
 
 std::chrono::milliseconds time_limit(std::chrono::milliseconds deadline, verb of) {
@@ -277,15 +296,23 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     const auto id = draw_id();
     const auto started = now();
     const auto deadline = saturating_add(started, time_limit(options.deadline_, how));
+    protocol::outgoing_request request{
+        .verb = how, .noun = text, .id = id, .carried = carried_by(options), .hops = options.hops_, .body = body};
     if (node_->secured) {
-        operation = node_->secured->watch(
-            {.how = how, .noun = noun, .body = body, .options = options, .deadline = deadline, .ticket = id},
-            std::move(operation));
+        operation = node_->secured->watch({.how = how,
+                                           .noun = noun,
+                                           .body = body,
+                                           .options = options,
+                                           .carried = request.carried,
+                                           .deadline = deadline,
+                                           .ticket = id},
+                                          std::move(operation));
     }
-    flush_scheduler_.run_user_call([&] {
-        r->send({.verb = how, .noun = text, .id = id, .carried = {.urgent = options.urgent_}, .body = body}, deadline,
-                started, std::move(operation), options.on_progress_);
-    });
+    if (request.carried.trace.sampled) {
+        operation = peer_channels_.record(request, options.at_, {}, std::move(operation));
+    }
+    flush_scheduler_.run_user_call(
+        [&] { r->send(request, deadline, started, std::move(operation), options.on_progress_); });
     return id;
 }
 
@@ -317,6 +344,7 @@ std::uint64_t local_node::send_command(std::string_view command, const call_opti
         chosen.deadline(chosen.deadline_.count() > 0 ? std::min(chosen.deadline_, *left) : *left);
     }
     chosen.urgent(chosen.urgent_ || parsed.urgent);
+    chosen.hops(parsed.hops == protocol::default_hops ? chosen.hops_ : parsed.hops);
     const auto noun = std::string{parsed.noun.target} + ":" + std::string{parsed.noun.path};
     return send(parsed.verb, noun, parsed.body, chosen, std::move(operation));
 }

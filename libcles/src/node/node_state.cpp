@@ -3,6 +3,7 @@
 
 #include "node/membership/gossip.hpp"
 #include "node/security_protocol.hpp"
+#include "node/tracing/span_recorder.hpp"
 
 #include <utility>
 
@@ -17,7 +18,8 @@ node_state::node_state(node_options setup, const core::clock& source, const std:
       kept_requests(std::make_shared<memory_account>(memory)), peers(name, setup.epoch, deadlines, bounds.peers),
       unsent(wake),
       published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch, unsent),
-      unsent_relayed(wake), remembered{.limit = bounds.remembered}, secured(security ? setup.secured(*this) : nullptr) {
+      unsent_relayed(wake), remembered{.limit = bounds.remembered}, secured(security ? setup.secured(*this) : nullptr),
+      spans(setup.tracing != nullptr ? setup.tracing->make(*this, source) : nullptr) {
     published.sign_for(tasks, security.get());
     peers.begin(setup.pool, started);
 }

@@ -23,6 +23,10 @@
 #include <string_view>
 #include <vector>
 
+namespace cles::detail {
+struct tracing_part;
+} // namespace cles::detail
+
 namespace cles::core {
 
 class gossip;
@@ -30,6 +34,7 @@ class node_security;
 class other_pools;
 class request_sharing;
 class security_protocol;
+class span_recorder;
 
 struct node_state;
 
@@ -45,6 +50,7 @@ struct node_options {
     /// Creates what a secured node says; null only without `security`.
     std::unique_ptr<security_protocol> (*secured)(node_state& host) = nullptr;
     other_pools* pools = nullptr; ///< owned by `metrics`; null: the node reaches its own pool only
+    const detail::tracing_part* tracing = nullptr; ///< null: nothing is recorded of traced requests
     log_sink log{};
     std::function<void(json_writer&)> metrics{}; ///< metrics of the program
     std::function<node_load()> load{};           ///< load of the program; empty: its running handlers
@@ -93,6 +99,7 @@ struct node_state {
     dedup_memory remembered;
     reflection_limit reflection;
     const std::unique_ptr<security_protocol> secured; ///< null: the node is not secured
+    const std::shared_ptr<span_recorder> spans;       ///< null: nothing is recorded of traced requests
     std::uint64_t next_id = 1;                        ///< of the requests that this node sends
     router* active_router = nullptr;                  ///< serves requests for `any`, `all` and other nodes; null: none
 

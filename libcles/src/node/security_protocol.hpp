@@ -42,6 +42,7 @@ struct outgoing_call {
     const protocol::noun_view& noun;
     std::string_view body{};
     const call_options& options;
+    protocol::carried_adverbs carried{};
     time_point deadline{};
     std::uint64_t ticket = 0; ///< the id of the first attempt
 };

@@ -2,6 +2,7 @@
 #include "protocol/request_line.hpp"
 
 #include "json/json_scan.hpp"
+#include "protocol/hex_number.hpp"
 #include "protocol/line.hpp"
 #include "protocol/reply_line.hpp"
 
@@ -58,6 +59,14 @@ bool take_routes(routes_question& target, std::string_view text) {
     return dot < 3 && take(target.distance, number_between(text.substr(0, dot), 1, max_hops)) && is_name(target.by);
 }
 
+// Whatever it is, it does not make the request invalid. The first valid one counts.
+bool take_trace(std::string_view text, request_line& r) {
+    if (!r.trace) {
+        r.trace = parse_traceparent(text).value_or(trace_context{});
+    }
+    return true;
+}
+
 template <class... Verbs>
 constexpr unsigned on(Verbs... verbs) {
     return ((1U << static_cast<unsigned>(verbs)) | ...);
@@ -108,7 +117,8 @@ constexpr std::array known_adverbs{
     known_adverb{"grant", on(verb::push, verb::delegate),
                  [](std::string_view v, request_line& r) { return take(r.grant, parse_grant(v)); }},
     known_adverb{"mark", on(verb::bind),
-                 [](std::string_view v, request_line& r) { return take_flag(r.wants_mark, true, v == "yes"); }}};
+                 [](std::string_view v, request_line& r) { return take_flag(r.wants_mark, true, v == "yes"); }},
+    known_adverb{"trace", on_all, take_trace}};
 
 /// Its index; past the end: it is not defined for that verb.
 std::size_t find_known(std::string_view key, verb v) noexcept {
@@ -142,7 +152,7 @@ bool parse_adverbs(part_reader& parts, request_line& out, std::string& why) {
             continue;
         }
         const auto bit = 1U << known;
-        if ((seen & bit) != 0) {
+        if ((seen & bit) != 0 && a.key != "trace") {
             why = "the adverb " + quoted(a.key) + " occurs twice";
             return false;
         }
@@ -282,6 +292,9 @@ void append_request(std::string& out, const outgoing_request& request) {
     if (request.carried.urgent) {
         out.append(" urgent=yes");
     }
+    if (request.carried.trace) {
+        out.append(" trace=").append(traceparent_text(request.carried.trace));
+    }
     if (request.lease_ms) {
         append_adverb(out, "lease", *request.lease_ms);
     }
@@ -290,6 +303,9 @@ void append_request(std::string& out, const outgoing_request& request) {
     }
     if (request.keep != 0) {
         append_adverb(out, "keep", request.keep);
+    }
+    if (request.hops != default_hops) {
+        append_adverb(out, "hops", request.hops);
     }
     if (!request.adverbs.empty()) {
         out.push_back(' ');
@@ -309,37 +325,6 @@ void append_update_head(std::string& out, std::string_view publisher, std::strin
     append_adverb(out, "seq", seq);
     out.append(" epoch=").append(epoch).push_back(' ');
 }
-
-namespace {
-
-/// Lower-case hex digits, all that `Number` has.
-template <class Number>
-std::optional<Number> parse_hex(std::string_view text) noexcept {
-    Number value = 0;
-    if (text.size() != 2 * sizeof(Number)) {
-        return std::nullopt;
-    }
-    for (const auto c : text) {
-        const bool digit = json_detail::is_digit(c);
-        if (!digit && (c < 'a' || c > 'f')) {
-            return std::nullopt;
-        }
-        value = value << 4U | static_cast<Number>(digit ? c - '0' : c - 'a' + 10);
-    }
-    return value;
-}
-
-template <class Number>
-std::string hex_text(Number value) {
-    constexpr std::string_view digits = "0123456789abcdef";
-    std::string text(2 * sizeof(Number), '0');
-    for (std::size_t i = text.size(); i-- > 0; value >>= 4U) {
-        text[i] = digits[value & 0xFU];
-    }
-    return text;
-}
-
-} // namespace
 
 std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept { return parse_hex<std::uint32_t>(text); }
 

@@ -5,6 +5,7 @@
 #include <cles/verb.hpp>
 
 #include "protocol/grammar.hpp"
+#include "protocol/traceparent.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -23,6 +24,7 @@ inline constexpr std::uint32_t default_delegate_deadline_ms = 30'000;
 inline constexpr std::uint32_t default_keep = 64;
 inline constexpr std::uint64_t max_keep = 65'536;
 inline constexpr std::uint64_t max_hops = 16;
+inline constexpr std::uint32_t default_hops = 8;
 inline constexpr std::uint32_t default_lease_ms = 10'000;
 inline constexpr std::uint32_t max_lease_ms = 60'000;
 inline constexpr std::size_t max_since = 64;
@@ -43,6 +45,7 @@ constexpr std::uint32_t default_deadline(verb v) noexcept {
 /// is parsed to the call that replies later, and through nodes that forward it. Code in between copies them as a whole.
 struct carried_adverbs {
     bool urgent = false;
+    trace_context trace{};
 
     /// These, of whatever has them.
     [[nodiscard]] const carried_adverbs& carried() const noexcept { return *this; }
@@ -56,7 +59,7 @@ struct request_line : carried_adverbs {
     std::uint32_t deadline_ms = default_deadline_ms;
     bool wants_reply = true;
     bool wants_progress = false;
-    std::uint8_t hops = 8;
+    std::uint8_t hops = default_hops;
     std::optional<std::uint32_t> lease_ms;
     std::uint32_t every_ms = 0; ///< 0: every update
     std::uint32_t keep = default_keep;
@@ -118,7 +121,8 @@ struct outgoing_request {
     std::optional<std::uint32_t> lease_ms{};
     std::uint32_t every_ms = 0;
     std::uint32_t keep = 0;
-    std::string_view adverbs{}; ///< further ones, in wire format
+    std::uint32_t hops = default_hops; ///< not written if it is the default
+    std::string_view adverbs{};        ///< further ones, in wire format
     std::string_view body{};
 
     /// The node that the noun names.
@@ -158,6 +162,7 @@ class owned_request {
     explicit owned_request(const protocol::request_line& r) : line_(r.text) {
         protocol::malformed_request ignored;
         protocol::parse_request(line_, parsed_, ignored); // was valid on arrival
+        parsed_.trace = r.trace;                          // of this node's span
     }
     owned_request(const owned_request&) = delete;
     owned_request& operator=(const owned_request&) = delete;

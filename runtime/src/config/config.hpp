@@ -5,6 +5,8 @@
 #include <cles/log.hpp>
 #include <cles/multicast.hpp>
 
+#include "isolation/isolation_limits.hpp"
+
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -23,16 +25,6 @@ struct log_config {
     log_format format = log_format::text;
 
     bool operator==(const log_config&) const = default;
-};
-
-/// What a plugin may use that runs in a process of its own.
-struct isolation_limits {
-    std::uint64_t memory = std::uint64_t{1} << 30U;
-    std::uint32_t open_files = 256;
-    std::vector<std::string> read{};  ///< paths that it may read, besides those of the system
-    std::vector<std::string> write{}; ///< paths that it may read and write
-
-    bool operator==(const isolation_limits&) const = default;
 };
 
 struct plugin_config {
@@ -110,6 +102,8 @@ struct config {
     /// The location and key with which a message about a value begins: "clesd.yaml:7: plugins[0].path". A value without
     /// a location of its own has that of the value that contains it; a default has none.
     [[nodiscard]] std::string location_of(const std::string& key) const;
+    /// How many jobs of an isolated plugin may run at once: one for each worker and each replacement.
+    [[nodiscard]] std::size_t lanes() const noexcept { return std::size_t{workers} + replacements; }
 };
 
 /// \param host the host's name \param cores the host's number of processor cores

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "daemon/daemon.hpp"
 
+#include <cles/tracing.hpp>
+
 #include "config/config.hpp"
 #include "config/config_file.hpp"
 #include "config/config_values.hpp"
 #include "daemon/daemon_federation.hpp"
 #include "daemon/daemon_security.hpp"
+#include "jobs/current_trace.hpp"
 #include "jobs/pooled_registrar.hpp"
 #include "plugins/plugin_library.hpp"
 #include "plugins/plugin_start_guard.hpp"
@@ -15,6 +18,8 @@
 
 #include <algorithm>
 #include <csignal>
+#include <filesystem>
+#include <optional>
 #include <utility>
 
 namespace cles::runtime {
@@ -40,6 +45,7 @@ service_options options_of(const config& setup, const daemon_log& log) {
     options.limits = setup.limits;
     options.log = log.sink();
     options.routing = cles::routing();
+    options.tracing = cles::tracing();
     options.gossip = cles::gossip(setup.seeds, setup.links); // without any, this node may be the seed of others
     return options;
 }
@@ -61,9 +67,25 @@ plugin_host_options host_options_of(const config& setup, const daemon_log& log) 
     options.folders = options.rules.folders;
     options.trial = 0ms; // they were tried before threads were started
     options.log = [&log](log_level level, std::string_view plugin, std::string_view text) {
-        log.write(level, std::string{plugin} + ": " + std::string{text});
+        const auto line = std::string{plugin} + ": " + std::string{text};
+        log.write(level, {line, {}, 0, current_trace::id()});
     };
     return options;
+}
+
+load_message load_message_of(const config& setup, const plugin_config& wanted, const std::string& path) {
+    const auto rules = plugin_rules_of(setup);
+    load_message made{.node = setup.node,
+                      .path = path,
+                      .config = wanted.config,
+                      .sha256 = wanted.sha256,
+                      .folders = {},
+                      .secured = rules.secured,
+                      .limits = wanted.limits};
+    for (const auto& folder : rules.folders) {
+        made.folders.push_back(folder.string());
+    }
+    return made;
 }
 
 std::string counted(std::size_t count, const char* what) {
@@ -137,7 +159,7 @@ void daemon::load_plugin(std::size_t index) {
     const auto& wanted = setup_.plugins[index];
     const auto path = resolve_plugin_path(setup_, wanted);
     if (wanted.isolated) {
-        load_isolated(wanted, path);
+        load_isolated(index, path);
         return;
     }
     {
@@ -152,7 +174,7 @@ void daemon::load_plugin(std::size_t index) {
               " from " + loaded.path);
 }
 
-void daemon::load_isolated(const plugin_config& wanted, const std::string& path) {
+void daemon::load_isolated(std::size_t index, const std::string& path) {
     const isolated_plugin_node node{
         .executor = io_.get_executor(),
         .add =
@@ -161,30 +183,17 @@ void daemon::load_isolated(const plugin_config& wanted, const std::string& path)
             },
         .remove = [this](cles::verb verb, std::string_view task) { service_.remove(verb, task); },
         .publish = [this](std::string_view noun, const json_text& value) { service_.update(noun, value); },
-        .retire = [this](std::string_view noun) { service_.retire(noun); },
+        .retire = [this](std::string_view task) { service_.retire_all(task); },
         .log = host_options_of(setup_, log_).log};
-    const auto rules = plugin_rules_of(setup_);
-    load_message loading{.node = setup_.node,
-                         .path = path,
-                         .config = wanted.config,
-                         .sha256 = wanted.sha256,
-                         .folders = {},
-                         .secured = rules.secured,
-                         .memory = wanted.limits.memory,
-                         .open_files = wanted.limits.open_files,
-                         .readable = wanted.limits.read,
-                         .writable = wanted.limits.write};
-    for (const auto& folder : rules.folders) {
-        loading.folders.push_back(folder.string());
-    }
     const auto isolated =
-        std::make_shared<isolated_plugin>(node, std::move(loading),
+        std::make_shared<isolated_plugin>(node, load_message_of(setup_, setup_.plugins[index], path),
                                           session_options{.program = "/proc/self/exe",
-                                                          .lanes = std::size_t{setup_.workers} + setup_.replacements,
+                                                          .plugin = std::filesystem::path{path}.filename().string(),
+                                                          .lanes = setup_.lanes(),
                                                           .grace = setup_.stuck_after,
                                                           .max_line = 2 * setup_.limits.line + 65536});
     isolated->start();
-    isolated_.push_back(isolated);
+    isolated_.push_back({index, isolated});
 }
 
 void daemon::write_metrics(json_writer& w) const {
@@ -196,7 +205,7 @@ void daemon::write_metrics(json_writer& w) const {
         w.key("isolated");
         w.begin_array();
         for (const auto& each : isolated_) {
-            write_json(w, each->figures());
+            write_json(w, each.plugin->figures());
         }
         w.end_array();
     }
@@ -277,7 +286,7 @@ void daemon::finish() {
     const auto limit =
         stopped_at_once_ ? 100ms : std::clamp<milliseconds>(time_left(), plugin_host::min_stop_time, 2000ms);
     for (const auto& each : isolated_) {
-        each->begin_stop(); // they stop at the same time as the others
+        each.plugin->begin_stop(); // they stop at the same time as the others
     }
     const auto until = steady_clock::now() + limit;
     const auto stopped = plugins_.stop(limit);
@@ -299,12 +308,12 @@ void daemon::finish() {
 
 void daemon::end_isolated(milliseconds limit) {
     for (const auto& each : isolated_) {
-        each->begin_stop();
+        each.plugin->begin_stop();
     }
     const auto until = steady_clock::now() + limit;
-    for (const auto& each : isolated_) {
-        if (each->finish_stop(until)) {
-            log_.warning("plugin " + each->figures().name + " did not stop in time, and its process was ended");
+    for (const auto& [index, plugin] : isolated_) {
+        if (plugin->finish_stop(until)) {
+            log_.warning("plugin " + plugin->figures().name + " did not stop in time, and its process was ended");
         }
     }
     isolated_.clear();
@@ -327,21 +336,40 @@ void daemon::reload() {
         log_.set(fresh.log);
         log_.info("reloaded the configuration: " + counted(fresh.seeds.size(), "seed") + ", log " +
                   std::string{to_string(fresh.log.level)});
+        retry_isolated(&fresh);
         if (fixed_part(fresh) != fixed_part(setup_)) {
             log_.warning("other changes of the configuration take effect at the next start");
         }
         service_.set_gossip(cles::gossip(fresh.seeds, setup_.links));
-        for (const auto& each : isolated_) {
-            each->retry();
-        }
         setup_.seeds = fresh.seeds;
         setup_.log = fresh.log;
     } catch (const config_error& e) {
         log_.error(std::string{"kept the old configuration, because the new one cannot be used: "} + e.what());
+        retry_isolated(nullptr);
     }
     notified = service_manager_.ready() && notified;
     if (!notified) {
         log_.warning("the service manager could not be notified");
+    }
+}
+
+// With the settings and limits of the new configuration, if there is one and it still has the plugin.
+void daemon::retry_isolated(const config* fresh) {
+    for (const auto& [index, plugin] : isolated_) {
+        auto& known = setup_.plugins[index];
+        std::optional<load_message> changed;
+        const plugin_config* wanted = nullptr;
+        if (fresh != nullptr) {
+            const auto found = std::ranges::find(fresh->plugins, known.path, &plugin_config::path);
+            if (found == fresh->plugins.end() || !found->isolated) {
+                continue; // no longer wanted
+            }
+            wanted = &*found;
+            changed = load_message_of(setup_, *wanted, resolve_plugin_path(setup_, known));
+        }
+        if (plugin->retry(std::move(changed)) && wanted != nullptr) {
+            known = *wanted;
+        }
     }
 }
 

@@ -48,7 +48,8 @@ class daemon {
   private:
     void load_plugins();
     void load_plugin(std::size_t index);
-    void load_isolated(const plugin_config& wanted, const std::string& path);
+    void load_isolated(std::size_t index, const std::string& path);
+    void retry_isolated(const config* fresh);
     void write_metrics(json_writer& w) const;
     void wait_for_signal();
     void stop(int signal);
@@ -70,7 +71,11 @@ class daemon {
     service service_;
     job_pool pool_;
     plugin_host plugins_;
-    std::vector<std::shared_ptr<isolated_plugin>> isolated_;
+    struct isolated_entry {
+        std::size_t index; // of its configuration
+        std::shared_ptr<isolated_plugin> plugin;
+    };
+    std::vector<isolated_entry> isolated_;
     boost::asio::signal_set signals_;
     std::chrono::steady_clock::time_point stop_begun_;
     bool stopping_ = false;

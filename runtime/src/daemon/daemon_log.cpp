@@ -63,6 +63,10 @@ std::string format_json(std::string_view node, const log_entry& entry) {
         w.plain_key("id");
         w.value(entry.request);
     }
+    if (!entry.trace.empty()) {
+        w.plain_key("trace");
+        w.value(entry.trace);
+    }
     w.plain_key("message");
     w.value(entry.text);
     w.end_object();

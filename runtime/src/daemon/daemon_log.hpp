@@ -20,8 +20,8 @@ namespace cles::runtime {
 /// that a peer's text can neither control a terminal nor start a new line.
 std::string format_text(std::string_view node, const log_entry& entry);
 
-/// The same as the members of a JSON object, without braces: `"node":"sat1","peer":"tcp://…","id":7,"message":"…"`.
-/// Missing ones are omitted.
+/// The same as the members of a JSON object, without braces: `"node":"sat1","peer":"tcp://…","id":7,"trace":"4bf9…",
+/// "message":"…"`. Missing ones are omitted.
 std::string format_json(std::string_view node, const log_entry& entry);
 
 /// The daemon's log, on stderr: text, in colour on a terminal (unless NO_COLOR is set), or JSON, one object per line.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <string_view>
 #include <utility>
 
 #include <unistd.h>
@@ -33,5 +34,15 @@ class owned_descriptor {
   private:
     int fd_ = -1;
 };
+
+struct pipe_ends {
+    owned_descriptor from; ///< does not block
+    owned_descriptor into; ///< blocks, so that no output is lost
+};
+/// Sends all to a connected socket that blocks. Returns 0, or the error (errno).
+[[nodiscard]] int send_all(int socket, std::string_view text) noexcept;
+
+/// A pipe whose ends are closed by `exec`. \throws std::system_error
+pipe_ends make_pipe();
 
 } // namespace cles::runtime

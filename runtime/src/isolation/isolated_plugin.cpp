@@ -20,8 +20,8 @@ constexpr std::chrono::seconds max_start_time{10};
 // takes long to start must not keep the workers from other plugins.
 constexpr std::chrono::seconds max_wait{1};
 constexpr std::chrono::milliseconds retry_after{250};
-constexpr std::size_t max_published = 4096;
 constexpr std::size_t max_last_output = 500;
+constexpr std::size_t max_name = 100;
 
 } // namespace
 
@@ -69,21 +69,21 @@ std::shared_ptr<plugin_session> isolated_plugin::session_for(const responder& an
 void isolated_plugin::start() {
     try {
         launch();
-    } catch (const std::system_error& e) {
+    } catch (const std::exception& e) {
         throw plugin_error(loading_.path, e.what());
     }
     const auto session = starting_;
     const bool in_time = session->wait_for_start(max_start_time);
-    const auto fail = [&](const std::string& why, const std::optional<std::string>& setting = std::nullopt) {
+    const auto fail = [&](const std::string& why, const std::string& key = "path") {
         stopping_ = true;
         ++run_; // its end is no news
         session->close(std::chrono::steady_clock::now());
         starting_.reset();
         withdraw();
-        throw plugin_error(loading_.path, why, setting);
+        throw plugin_error(loading_.path, why, key);
     };
     if (refused_) {
-        fail(refused_->why, refused_->setting);
+        fail(refused_->why, refused_->key);
     }
     if (!start_failure_.empty()) {
         fail(start_failure_);
@@ -92,11 +92,8 @@ void isolated_plugin::start() {
         fail("its start does not end");
     }
     if (starting_) { // it has not said that it has started
-        std::string how;
-        const auto run = run_;
         session->close(std::chrono::steady_clock::now() + 1s);
-        how = run == run_ ? start_failure_ : "";
-        fail(how.empty() ? "its process ended while it started" : how);
+        fail(start_failure_.empty() ? "its process ended while it started" : start_failure_);
     }
     first_start_ = false;
     session->run();
@@ -108,6 +105,7 @@ void isolated_plugin::launch() {
     start_failure_.clear();
     last_output_.clear();
     starting_ = std::make_shared<plugin_session>(node_.executor, name_, session_options_, events_of(run_));
+    loading_.require_paths = first_start_; // a device may be unplugged while it runs
     starting_->load(loading_);
 }
 
@@ -123,24 +121,28 @@ session_events isolated_plugin::events_of(std::uint64_t run) {
     session_events events;
     events.started = guarded([](isolated_plugin& self, const started_message& what) { self.on_started(what); });
     events.refused = guarded([](isolated_plugin& self, const refused_message& what) { self.refused_ = what; });
-    events.log =
-        guarded([](isolated_plugin& self, log_level level, std::string_view text) { self.log_output(level, text); });
+    events.log = guarded([](isolated_plugin& self, log_level level, std::string_view text, const responder* job) {
+        self.log_output(level, text, job);
+    });
     events.output = guarded([](isolated_plugin& self, std::string_view text) {
         self.last_output_ = text.substr(0, max_last_output);
         self.log_output(log_level::info, text);
     });
     events.publish =
         guarded([](isolated_plugin& self, std::string_view noun, std::string_view json) { self.publish(noun, json); });
-    events.ended = guarded([run](isolated_plugin& self, const std::string& how) { self.on_ended(run, how); });
+    events.ended = guarded([](isolated_plugin& self, const process_end& how) { self.on_ended(how); });
     return events;
 }
 
 void isolated_plugin::on_started(const started_message& what) {
-    start_limit_.reset();
+    if (stopping_ || !starting_) {
+        return;
+    }
+    start_timer_.reset();
     try {
         {
             const std::scoped_lock lock{mutex_};
-            name_ = what.name.empty() ? loading_.path : what.name;
+            name_ = what.name.empty() ? loading_.path : what.name.substr(0, max_name);
         }
         starting_->set_name(name_);
         offer(what.tasks);
@@ -152,6 +154,9 @@ void isolated_plugin::on_started(const started_message& what) {
     log(log_level::info, (first_start_ ? "runs in process " : "runs again, in process ") +
                              std::to_string(starting_->process()) + ", with " + tasks +
                              "; confined to: " + what.confinement);
+    for (const auto& each : what.missing) {
+        log_output(log_level::warning, each);
+    }
     const std::scoped_lock lock{mutex_};
     current_ = std::move(starting_);
     missing_since_.reset();
@@ -165,19 +170,15 @@ void isolated_plugin::fail_to_start(const std::string& why) {
     starting_->kill(why);
 }
 
-void isolated_plugin::on_ended(std::uint64_t run, const std::string& how) {
-    start_limit_.reset();
-    auto reason = refused_ ? "refused to start: " + refused_->why : how;
-    if (!last_output_.empty() && (starting_ || !refused_)) {
-        reason += "; it said last: " + last_output_;
-    }
+void isolated_plugin::on_ended(const process_end& how) {
+    start_timer_.reset();
+    auto why = describe(how);
     if (first_start_) { // `start` reports it
         if (start_failure_.empty()) {
-            start_failure_ = "its process " + reason;
+            start_failure_ = std::move(why);
         }
         return;
     }
-    const bool was_starting = starting_ != nullptr;
     starting_.reset();
     {
         const std::scoped_lock lock{mutex_};
@@ -186,62 +187,83 @@ void isolated_plugin::on_ended(std::uint64_t run, const std::string& how) {
             missing_since_ = clock::now();
         }
     }
-    if (!stopping_ && run == run_) {
-        judge_end(was_starting ? reason + ", while it was started again" : reason);
+    if (stopping_) {
+        return;
+    }
+    ++ended_;
+    restart_or_withdraw(why);
+}
+
+std::string isolated_plugin::describe(const process_end& how) const {
+    if (refused_) {
+        return "its process refused to start: " + refused_->why;
+    }
+    const bool again = starting_ && !first_start_;
+    return "its process " + (again ? "crashed again while starting: " + how.cause : how.text()) +
+           (last_output_.empty() ? "" : "; last output: '" + last_output_ + "'");
+}
+
+void isolated_plugin::restart_or_withdraw(const std::string& why) {
+    if (policy_.ended(clock::now()) == restart_policy::decision::restart) {
+        log(log_level::error, why + ". Restarting.");
+        relaunch();
+    } else {
+        log(log_level::error, "third end within 60 s; the last: " + why + ". Its tasks are withdrawn until SIGHUP.");
+        withdraw();
     }
 }
 
-// Starts it again, or withdraws its tasks.
-void isolated_plugin::judge_end(std::string how) {
-    while (policy_.ended(clock::now()) == restart_policy::decision::restart) {
-        log(log_level::error, "its process " + how + "; it is started again");
-        if (relaunch(how)) {
-            return;
+void isolated_plugin::restart_after(std::chrono::milliseconds delay, const std::string& why) {
+    log(log_level::error, why + ". Restarting in " + std::to_string(delay.count()) + " ms.");
+    start_timer_.emplace(node_.executor, delay);
+    start_timer_->async_wait([weak = weak_from_this()](boost::system::error_code cancelled) {
+        if (const auto self = weak.lock(); self && !cancelled && !self->stopping_) {
+            self->relaunch();
         }
-    }
-    log(log_level::error,
-        "its process " + how + ", for the third time within 60 s: its tasks are withdrawn until SIGHUP");
-    withdraw();
+    });
 }
 
-// Returns whether it could; otherwise says why not.
-bool isolated_plugin::relaunch(std::string& failure) {
+void isolated_plugin::relaunch() {
     try {
         launch();
         starting_->run();
-    } catch (const std::system_error& e) {
+    } catch (const std::exception& e) { // too many open files, for example
         starting_.reset();
-        failure = std::string{"could not be started: "} + e.what();
-        return false;
+        restart_after(policy_.delay(clock::now()), std::string{"its process could not be started: "} + e.what());
+        return;
     }
-    start_limit_.emplace(node_.executor, max_start_time);
-    start_limit_->async_wait([weak = std::weak_ptr{starting_}](boost::system::error_code cancelled) {
+    start_timer_.emplace(node_.executor, max_start_time);
+    start_timer_->async_wait([weak = std::weak_ptr{starting_}](boost::system::error_code cancelled) {
         if (const auto session = weak.lock(); session && !cancelled) {
             session->kill("it did not start in time");
         }
     });
-    return true;
 }
 
-void isolated_plugin::retry() {
+bool isolated_plugin::retry(std::optional<load_message> changed) {
     if (stopping_ || !policy_.reset()) {
-        return;
+        return false;
     }
-    log(log_level::info, "its tasks were withdrawn; it is started again");
-    if (std::string failure; !relaunch(failure)) {
-        judge_end(std::move(failure));
+    log(log_level::info, std::string{"its tasks were withdrawn. Restarting on SIGHUP with the "} +
+                             (changed ? "new" : "old") + " configuration.");
+    if (changed) {
+        loading_ = std::move(*changed);
     }
+    relaunch();
+    return true;
 }
 
 // -- its tasks -----------------------------------------------------------------------------------------------------
 
 void isolated_plugin::offer(const std::vector<offered_task>& tasks) {
-    for (const auto& old : offered_) {
-        if (std::find(tasks.begin(), tasks.end(), old) == tasks.end()) {
-            node_.remove(*verb_from(old.verb), old.task);
+    std::erase_if(offered_, [&](const auto& old) {
+        if (std::find(tasks.begin(), tasks.end(), old) != tasks.end()) {
+            return false;
         }
-    }
-    std::erase_if(offered_, [&](const auto& old) { return std::find(tasks.begin(), tasks.end(), old) == tasks.end(); });
+        node_.remove(*verb_from(old.verb), old.task);
+        node_.retire(old.task);
+        return true;
+    });
     for (const auto& each : tasks) {
         const auto verb = verb_from(each.verb);
         if (!verb) {
@@ -270,12 +292,9 @@ void isolated_plugin::offer(const std::vector<offered_task>& tasks) {
 void isolated_plugin::withdraw() {
     for (const auto& each : offered_) {
         node_.remove(*verb_from(each.verb), each.task);
+        node_.retire(each.task);
     }
     offered_.clear();
-    for (const auto& noun : published_) {
-        node_.retire(noun);
-    }
-    published_.clear();
     const std::scoped_lock lock{mutex_};
     unavailable_ = true;
     why_unavailable_ = "the plugin '" + name_ + "' ended too often, and was withdrawn";
@@ -284,10 +303,11 @@ void isolated_plugin::withdraw() {
 
 void isolated_plugin::publish(std::string_view noun, std::string_view json) {
     try {
-        node_.publish(noun, json_text{std::string{json}});
-        if (published_.size() < max_published && !published_.contains(noun)) {
-            published_.emplace(noun);
+        const auto task = noun.substr(0, noun.find('/'));
+        if (std::ranges::find(offered_, task, &offered_task::task) == offered_.end()) {
+            throw error(errc::denied, "it is no task of the plugin");
         }
+        node_.publish(noun, json_text{std::string{json}});
     } catch (const error& e) {
         log_output(log_level::warning, "an update of '" + std::string{noun} + "' was dropped: " + e.message());
     }
@@ -299,7 +319,7 @@ void isolated_plugin::begin_stop() {
     if (std::exchange(stopping_, true)) {
         return;
     }
-    start_limit_.reset();
+    start_timer_.reset();
     const auto why = loading_.node + " has stopped";
     std::shared_ptr<plugin_session> running;
     {
@@ -337,7 +357,7 @@ isolated_plugin_figures isolated_plugin::figures() const {
                      : policy_.withdrawn() ? "withdrawn"
                                            : "starting",
             .process = session ? static_cast<std::uint64_t>(session->process()) : 0,
-            .ended = policy_.count(),
+            .ended = ended_,
             .jobs = session ? session->open_jobs() : 0};
 }
 
@@ -346,14 +366,14 @@ isolated_plugin_figures isolated_plugin::figures() const {
 void isolated_plugin::log(log_level level, std::string_view text) { node_.log(level, name_, text); }
 
 // What the process says may be too much.
-void isolated_plugin::log_output(log_level level, std::string_view text) {
+void isolated_plugin::log_output(log_level level, std::string_view text, const responder* job) {
     if (!budget_.take(clock::now())) {
         return;
     }
     if (const auto dropped = budget_.take_dropped(); dropped != 0) {
         log(log_level::warning, std::to_string(dropped) + " entries of its log came too fast, and were dropped");
     }
-    log(level, text);
+    job != nullptr ? job->log(level, text) : log(level, text);
 }
 
 } // namespace cles::runtime

@@ -22,7 +22,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,7 +34,7 @@ struct isolated_plugin_node {
     std::function<void(registration)> add; ///< on workers; throws as `registrar::add`
     std::function<void(cles::verb, std::string_view task)> remove;
     std::function<void(std::string_view noun, json_text)> publish; ///< throws as `service::update`
-    std::function<void(std::string_view noun)> retire;
+    std::function<void(std::string_view task)> retire;             ///< all that the task has published
     plugin_log log;
 };
 
@@ -62,8 +61,9 @@ class isolated_plugin : public std::enable_shared_from_this<isolated_plugin> {
     // All on the executor.
     /// Starts it and registers its tasks. Blocks until it has started. \throws plugin_error
     void start();
-    /// Offers the tasks again if they were withdrawn.
-    void retry();
+    /// Starts it again if its tasks were withdrawn, and returns whether they were. \param changed what its process is
+    /// told from now on; nothing: the same as before
+    bool retry(std::optional<load_message> changed);
     /// Asks the plugin to stop, without waiting.
     void begin_stop();
     /// Waits for its end, and kills it at that time. Returns whether it had to be killed.
@@ -77,27 +77,30 @@ class isolated_plugin : public std::enable_shared_from_this<isolated_plugin> {
     void launch();
     session_events events_of(std::uint64_t run);
     void on_started(const started_message& what);
-    void on_ended(std::uint64_t run, const std::string& how);
+    void on_ended(const process_end& how);
+    [[nodiscard]] std::string describe(const process_end& how) const;
     void fail_to_start(const std::string& why);
-    void judge_end(std::string how);
-    bool relaunch(std::string& failure);
+    void restart_or_withdraw(const std::string& why);
+    void restart_after(std::chrono::milliseconds delay, const std::string& why);
+    void relaunch();
     void offer(const std::vector<offered_task>& tasks);
     void withdraw();
     void publish(std::string_view noun, std::string_view json);
     void log(log_level level, std::string_view text);
-    void log_output(log_level level, std::string_view text);
+    void log_output(log_level level, std::string_view text, const responder* job = nullptr);
 
     const isolated_plugin_node node_;
-    const load_message loading_;
+    load_message loading_;
     const session_options session_options_;
     std::string name_; // the path until it is known
     restart_policy policy_;
     log_budget budget_;
     std::vector<offered_task> offered_;
-    std::set<std::string, std::less<>> published_; // nouns, to be retired when it is withdrawn
-    std::shared_ptr<plugin_session> starting_;     // until it has started
-    std::optional<boost::asio::steady_timer> start_limit_;
-    std::uint64_t run_ = 0; // which one is the latest
+    std::shared_ptr<plugin_session> starting_; // until it has started
+    // When its start takes too long, or has to be tried again. Not held after the end, as by a session.
+    std::optional<boost::asio::steady_timer> start_timer_;
+    std::uint64_t run_ = 0;   // which one is the latest
+    std::uint64_t ended_ = 0; // how often its process has ended unexpectedly
     std::optional<refused_message> refused_;
     std::string start_failure_;
     std::string last_output_;

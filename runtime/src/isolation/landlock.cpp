@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/landlock.hpp"
 
+#include "isolation/descriptor.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <system_error>
+#include <utility>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -29,7 +33,7 @@ struct [[gnu::packed]] path_rule {
 
 constexpr unsigned version_query = 1;
 constexpr int rule_of_path = 1;
-constexpr std::uint64_t scope_signal = 1U << 1U;
+constexpr std::uint64_t scope_abstract_sockets_and_signals = 1U << 0U | 1U << 1U;
 
 constexpr std::uint64_t write_file = 1U << 1U;
 constexpr std::uint64_t read_file = 1U << 2U;
@@ -55,74 +59,70 @@ std::uint64_t rights_of(int version) noexcept {
 class ruleset {
   public:
     explicit ruleset(int version) : all_(rights_of(version)) {
-        ruleset_attributes wanted{.handled_fs = all_, .handled_net = 0, .scoped = version >= 6 ? scope_signal : 0};
+        ruleset_attributes wanted{
+            .handled_fs = all_, .handled_net = 0, .scoped = version >= 6 ? scope_abstract_sockets_and_signals : 0};
         const auto size = version >= 6   ? sizeof wanted
                           : version >= 4 ? offsetof(ruleset_attributes, scoped)
                                          : offsetof(ruleset_attributes, handled_net);
-        rules_ = static_cast<int>(::syscall(SYS_landlock_create_ruleset, &wanted, size, 0));
-        if (rules_ < 0) {
+        rules_ = owned_descriptor{static_cast<int>(::syscall(SYS_landlock_create_ruleset, &wanted, size, 0))};
+        if (rules_.get() < 0) {
             throw_landlock_error("cannot limit the files of a plugin");
         }
     }
-    ruleset(const ruleset&) = delete;
-    ruleset& operator=(const ruleset&) = delete;
-    ~ruleset() { ::close(rules_); }
 
-    void allow(const std::filesystem::path& path, std::uint64_t rights, bool required) const {
-        const int opened = ::open(path.c_str(), O_PATH | O_CLOEXEC);
-        if (opened < 0) {
-            if (required) {
-                throw_landlock_error(path.string());
-            }
-            return;
+    // Returns why the path cannot be opened, if so.
+    [[nodiscard]] std::optional<std::string> allow(const std::filesystem::path& path, std::uint64_t rights) const {
+        const owned_descriptor opened{::open(path.c_str(), O_PATH | O_CLOEXEC)};
+        if (opened.get() < 0) {
+            return path.string() + ": " + std::generic_category().message(errno);
         }
         struct stat about {};
-        const bool is_folder = ::fstat(opened, &about) == 0 && S_ISDIR(about.st_mode);
-        const path_rule rule{.allowed = rights & all_ & (is_folder ? ~std::uint64_t{0} : of_files), .parent = opened};
-        const auto failed = ::syscall(SYS_landlock_add_rule, rules_, rule_of_path, &rule, 0) != 0;
-        const int code = errno;
-        ::close(opened);
-        if (failed) {
-            errno = code;
+        const bool is_folder = ::fstat(opened.get(), &about) == 0 && S_ISDIR(about.st_mode);
+        const path_rule rule{.allowed = rights & all_ & (is_folder ? ~std::uint64_t{0} : of_files),
+                             .parent = opened.get()};
+        if (::syscall(SYS_landlock_add_rule, rules_.get(), rule_of_path, &rule, 0) != 0) {
             throw_landlock_error(path.string());
         }
+        return std::nullopt;
     }
 
     void enforce() const {
-        if (::syscall(SYS_landlock_restrict_self, rules_, 0) != 0) {
+        if (::syscall(SYS_landlock_restrict_self, rules_.get(), 0) != 0) {
             throw_landlock_error("cannot limit the files of a plugin");
         }
     }
 
   private:
     std::uint64_t all_;
-    int rules_ = -1;
+    owned_descriptor rules_;
 };
 
 } // namespace
 
-int limit_files(const file_access& to) {
+file_limits limit_files(const file_access& to) {
     const auto version = static_cast<int>(::syscall(SYS_landlock_create_ruleset, nullptr, 0, version_query));
     if (version <= 0) {
-        return 0; // not built in, or not enabled
+        return {}; // not built in, or not enabled
     }
     const ruleset rules{version};
     constexpr auto read = read_file | read_folder;
     constexpr auto write = ~(execute | make_special);
-    for (const auto& path : to.readable) {
-        rules.allow(path, read, false);
-    }
-    for (const auto& path : to.writable) {
-        rules.allow(path, write, false);
-    }
-    for (const auto& path : to.required_readable) {
-        rules.allow(path, read, true);
-    }
-    for (const auto& path : to.required_writable) {
-        rules.allow(path, write, true);
-    }
+    const auto allow = [&rules](const auto& paths, std::uint64_t rights) {
+        std::vector<std::string> missing;
+        for (const auto& path : paths) {
+            if (auto why = rules.allow(path, rights)) {
+                missing.push_back(std::move(*why));
+            }
+        }
+        return missing;
+    };
+    allow(to.system_readable, read);
+    allow(to.system_writable, write);
+    file_limits done{.version = version,
+                     .missing_readable = allow(to.readable, read),
+                     .missing_writable = allow(to.writable, write)};
     rules.enforce();
-    return version;
+    return done;
 }
 
 } // namespace cles::runtime

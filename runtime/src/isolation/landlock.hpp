@@ -9,16 +9,22 @@ namespace cles::runtime {
 
 /// Which files a process may use. Nothing else can be opened, executed or changed.
 struct file_access {
-    std::vector<std::filesystem::path> readable{}; ///< missing ones are left out
-    std::vector<std::filesystem::path> writable{}; ///< missing ones are left out
-    std::vector<std::string> required_readable{};
-    std::vector<std::string> required_writable{};
+    std::vector<std::filesystem::path> system_readable{};
+    std::vector<std::filesystem::path> system_writable{};
+    std::vector<std::string> readable{};
+    std::vector<std::string> writable{};
 };
 
-/// Limits the files of the calling thread and of what it starts to these, and its signals to processes that are limited
-/// with it. \pre no new privileges
-/// \return the version of Landlock; 0 if the kernel has none, and then nothing is limited
-/// \throws std::system_error if a required path cannot be opened
-int limit_files(const file_access& to);
+struct file_limits {
+    int version = 0; ///< of Landlock; 0 if the kernel has none, and then nothing is limited
+    /// Those that cannot be opened, and why; not those of the system.
+    std::vector<std::string> missing_readable{};
+    std::vector<std::string> missing_writable{};
+};
+
+/// Limits the files of the calling thread and of what it starts to these, and its signals and abstract Unix sockets to
+/// processes that are limited with it. \pre no new privileges
+/// \throws std::system_error if the limits cannot be set
+file_limits limit_files(const file_access& to);
 
 } // namespace cles::runtime

@@ -3,10 +3,12 @@
 
 #include <cles/convert.hpp>
 
+#include "isolation/isolation_limits.hpp"
+
 #include <boost/describe/class.hpp>
 
+#include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,13 +29,10 @@ struct load_message {
     std::string sha256;
     std::vector<std::string> folders; ///< where plugins are searched for
     bool secured = false;
-    std::uint64_t memory = 0;
-    std::uint64_t open_files = 0;
-    std::vector<std::string> readable;
-    std::vector<std::string> writable;
+    isolation_limits limits;
+    bool require_paths = true; ///< all of the limits have to exist
 };
-BOOST_DESCRIBE_STRUCT(load_message, (),
-                      (node, path, config, sha256, folders, secured, memory, open_files, readable, writable))
+BOOST_DESCRIBE_STRUCT(load_message, (), (node, path, config, sha256, folders, secured, limits, require_paths))
 
 struct offered_task {
     std::string verb;
@@ -54,17 +53,21 @@ BOOST_DESCRIBE_STRUCT(offered_task, (),
 struct started_message {
     std::string name;
     std::string version;
-    std::string confinement; ///< what `confine` returned
+    std::string confinement;          ///< that is in force
+    std::vector<std::string> missing; ///< of it
     std::vector<offered_task> tasks;
 };
-BOOST_DESCRIBE_STRUCT(started_message, (), (name, version, confinement, tasks))
+BOOST_DESCRIBE_STRUCT(started_message, (), (name, version, confinement, missing, tasks))
 
 /// `PUSH self:cles/refused`, from the plugin's process, which ends then.
 struct refused_message {
     std::string why;
-    std::optional<std::string> setting;
+    std::string key; ///< that is to blame, as in `plugin_error`
 };
-BOOST_DESCRIBE_STRUCT(refused_message, (), (why, setting))
+BOOST_DESCRIBE_STRUCT(refused_message, (), (why, key))
+
+/// Longer entries of the log are cut.
+inline constexpr std::size_t max_log_text = 4096;
 
 /// `PUSH self:cles/log` and `PUSH self:cles/log/<id>`, from the plugin's process.
 struct log_message {
@@ -78,9 +81,10 @@ struct ask_message {
     std::string command;
     std::string at;
     bool urgent = false;
+    std::uint32_t hops = 8;
     std::int64_t deadline_ms = 0;
     bool progress = false;
 };
-BOOST_DESCRIBE_STRUCT(ask_message, (), (command, at, urgent, deadline_ms, progress))
+BOOST_DESCRIBE_STRUCT(ask_message, (), (command, at, urgent, hops, deadline_ms, progress))
 
 } // namespace cles::runtime

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/plugin_process.hpp"
 
+#include "isolation/plugin_environment.hpp"
+
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -8,6 +10,7 @@
 #include <system_error>
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sched.h>
 #include <spawn.h>
 #include <sys/socket.h>
@@ -15,6 +18,9 @@
 #include <sys/wait.h>
 
 namespace cles::runtime {
+
+using namespace std::chrono_literals;
+
 namespace {
 
 [[noreturn]] void throw_process_error(const char* what, int code = errno) {
@@ -44,17 +50,6 @@ connection_ends connected_sockets(int least) {
     return {std::move(own), moved_up(owned_descriptor{pair[1]}, least)};
 }
 
-connection_ends output_pipe(int least) {
-    std::array<int, 2> pair{};
-    if (::pipe2(pair.data(), O_CLOEXEC) != 0) {
-        throw_process_error("cannot connect the process of a plugin");
-    }
-    owned_descriptor own{pair[0]};
-    owned_descriptor other{pair[1]};
-    ::fcntl(own.get(), F_SETFL, O_NONBLOCK);
-    return {std::move(own), moved_up(std::move(other), least)};
-}
-
 class spawn_settings {
   public:
     spawn_settings() {
@@ -74,9 +69,15 @@ class spawn_settings {
 
 } // namespace
 
-plugin_process::plugin_process(const std::string& program, std::size_t lane_count) {
+std::string text_of_signal(int number) {
+    const char* name = ::sigabbrev_np(number);
+    return "signal " + std::to_string(number) + (name == nullptr ? "" : " (SIG" + std::string{name} + ")");
+}
+
+plugin_process::plugin_process(const std::string& program, std::string plugin, std::size_t lane_count) {
     const int least = control_descriptor + 1 + static_cast<int>(lane_count);
-    auto output_ends = output_pipe(least);
+    auto output_ends = make_pipe();
+    output_ends.into = moved_up(std::move(output_ends.into), least);
     std::vector<owned_descriptor> theirs;
     const auto connect = [&] {
         auto both = connected_sockets(least);
@@ -87,18 +88,23 @@ plugin_process::plugin_process(const std::string& program, std::size_t lane_coun
     for (std::size_t i = 0; i < lane_count; ++i) {
         lanes.push_back(connect());
     }
-    output = std::move(output_ends.own);
+    output = std::move(output_ends.from);
 
     spawn_settings how;
     ::posix_spawn_file_actions_addopen(&how.actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-    ::posix_spawn_file_actions_adddup2(&how.actions, output_ends.other.get(), STDOUT_FILENO);
-    ::posix_spawn_file_actions_adddup2(&how.actions, output_ends.other.get(), STDERR_FILENO);
+    ::posix_spawn_file_actions_adddup2(&how.actions, output_ends.into.get(), STDOUT_FILENO);
+    ::posix_spawn_file_actions_adddup2(&how.actions, output_ends.into.get(), STDERR_FILENO);
     for (std::size_t i = 0; i < theirs.size(); ++i) {
         ::posix_spawn_file_actions_adddup2(&how.actions, theirs[i].get(), control_descriptor + static_cast<int>(i));
     }
-    sigset_t none;
-    ::sigemptyset(&none);
-    ::posix_spawnattr_setsigmask(&how.attributes, &none);
+    // It ignores these, because a service manager may send them to all processes of the daemon, which ends it in order.
+    // Until it does so, they wait.
+    sigset_t waiting;
+    ::sigemptyset(&waiting);
+    for (const int number : {SIGTERM, SIGINT, SIGHUP}) {
+        ::sigaddset(&waiting, number);
+    }
+    ::posix_spawnattr_setsigmask(&how.attributes, &waiting);
     // A session of its own: signals of a terminal are for the daemon, which ends the process in order.
     auto flags = POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSID;
     if (const auto policy = ::sched_getscheduler(0); policy == SCHED_FIFO || policy == SCHED_RR) {
@@ -113,51 +119,70 @@ plugin_process::plugin_process(const std::string& program, std::size_t lane_coun
     std::string mode{plugin_process_mode};
     auto parent = std::to_string(::getpid());
     auto count = std::to_string(lane_count);
-    std::array<char*, 5> arguments{name.data(), mode.data(), parent.data(), count.data(), nullptr};
-    const int failed = ::posix_spawn(&id_, program.c_str(), &how.actions, &how.attributes, arguments.data(), environ);
+    std::array<char*, 6> arguments{name.data(), mode.data(), parent.data(), count.data(), plugin.data(), nullptr};
+    const int failed = ::posix_spawn(&id_, program.c_str(), &how.actions, &how.attributes, arguments.data(),
+                                     plugin_environment().data());
     if (failed != 0) {
         throw_process_error("cannot start the process of a plugin", failed);
     }
     handle_ = owned_descriptor{static_cast<int>(::syscall(SYS_pidfd_open, id_, 0))};
     if (handle_.get() < 0) {
         const int code = errno;
-        end();
+        ::kill(id_, SIGKILL);
+        ::waitpid(id_, nullptr, 0);
         throw_process_error("cannot watch the process of a plugin", code);
     }
 }
 
 plugin_process::~plugin_process() {
-    if (id_ > 0) {
-        end();
-    }
+    kill("the daemon needs it no more");
+    end();
 }
 
-void plugin_process::kill() noexcept {
+void plugin_process::kill(std::string_view why) {
     const std::scoped_lock lock{mutex_};
-    if (how_.empty()) { // otherwise its number may be that of another process
-        ::kill(-id_, SIGKILL);
-        ::kill(id_, SIGKILL);
+    if (end_) {
+        return; // its number may be that of another process
     }
+    if (killed_because_.empty()) {
+        killed_because_ = why;
+    }
+    ::kill(-id_, SIGKILL);
+    ::kill(id_, SIGKILL);
 }
 
-std::string plugin_process::end() noexcept {
-    kill();
+bool plugin_process::ends_within(std::chrono::milliseconds limit) const {
+    pollfd ended{.fd = handle_.get(), .events = POLLIN, .revents = 0};
+    return ::poll(&ended, 1, static_cast<int>(limit.count())) > 0;
+}
+
+process_end plugin_process::end() {
+    {
+        const std::scoped_lock lock{mutex_};
+        if (end_) {
+            return *end_;
+        }
+    }
+    // Its connections are closed a moment before it ends. The kernel may delay the end, even if it is killed.
+    if (!ends_within(100ms)) {
+        kill("it closed a connection");
+        static_cast<void>(ends_within(1s));
+    }
     const std::scoped_lock lock{mutex_};
-    if (!how_.empty()) {
-        return how_;
+    if (end_) {
+        return *end_;
     }
     int status = 0;
-    while (::waitpid(id_, &status, 0) < 0 && errno == EINTR) {
-    }
-    if (WIFSIGNALED(status)) {
-        const int number = WTERMSIG(status);
-        const char* name = ::sigabbrev_np(number);
-        how_ = "was ended by signal " + std::to_string(number) +
-               (name == nullptr ? "" : " (SIG" + std::string{name} + ")");
+    if (::waitpid(id_, &status, WNOHANG) != id_) {
+        end_ = {"does not end although it was killed because", killed_because_};
+    } else if (WIFEXITED(status)) {
+        end_ = {"ended itself with", "exit code " + std::to_string(WEXITSTATUS(status))};
+    } else if (WTERMSIG(status) == SIGKILL && !killed_because_.empty()) {
+        end_ = {"was ended because", killed_because_};
     } else {
-        how_ = "ended itself with exit code " + std::to_string(WEXITSTATUS(status));
+        end_ = {"was ended by", text_of_signal(WTERMSIG(status))};
     }
-    return how_;
+    return *end_;
 }
 
 } // namespace cles::runtime

@@ -4,29 +4,33 @@
 #include <cles/plugin_abi.h>
 
 #include "isolation/confinement.hpp"
+#include "isolation/descriptor.hpp"
+#include "isolation/line_buffer.hpp"
 #include "isolation/plugin_messages.hpp"
 #include "isolation/plugin_process.hpp"
 #include "isolation/process_jobs.hpp"
+#include "isolation/wire_line.hpp"
 #include "plugins/plugin_host.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
 
-#include <linux/close_range.h>
+#include <fcntl.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -35,15 +39,7 @@ namespace cles::runtime {
 namespace {
 
 constexpr std::chrono::milliseconds max_stop_time{2'000};
-constexpr int not_for_people = 2;
-
-template <class T>
-std::optional<T> number_of(const char* text) noexcept {
-    const std::string_view all{text};
-    T number{};
-    const auto [end, failed] = std::from_chars(all.data(), all.data() + all.size(), number);
-    return failed == std::errc{} && end == all.data() + all.size() ? std::optional<T>{number} : std::nullopt;
-}
+constexpr int exit_wrong_usage = 2;
 
 /// Reads lines from a socket.
 class line_reader {
@@ -52,18 +48,14 @@ class line_reader {
 
     /// The next line, which is valid until the next call; nothing at the end.
     std::optional<std::string_view> next() {
-        input_.erase(0, std::exchange(taken_, 0));
-        for (auto searched = std::size_t{0};;) {
-            const auto end = input_.find('\n', searched);
-            if (end != std::string::npos) {
-                taken_ = end + 1;
-                return std::string_view{input_}.substr(0, end);
+        for (;;) {
+            if (const auto line = input_.next()) {
+                return line;
             }
-            searched = input_.size();
             std::array<char, 8192> part; // NOLINT(*-member-init): it is written before it is read
             const auto size = ::recv(socket_, part.data(), part.size(), 0);
             if (size > 0) {
-                input_.append(part.data(), static_cast<std::size_t>(size));
+                input_.append({part.data(), static_cast<std::size_t>(size)});
             } else if (size == 0 || errno != EINTR) {
                 return std::nullopt;
             }
@@ -72,14 +64,39 @@ class line_reader {
 
   private:
     int socket_;
-    std::string input_;
-    std::size_t taken_ = 0;
+    line_buffer input_;
+};
+
+/// Passes updates to the daemon, which takes those of the plugin's own tasks only: so not before it knows these.
+class update_connection {
+  public:
+    explicit update_connection(control_connection& daemon) noexcept : daemon_(daemon) {}
+
+    void say(std::string_view line) {
+        const std::scoped_lock lock{mutex_};
+        if (open_) {
+            daemon_.say(line);
+        } else {
+            early_.append(line);
+        }
+    }
+    void open() {
+        const std::scoped_lock lock{mutex_};
+        open_ = true;
+        daemon_.say(std::exchange(early_, {}));
+    }
+
+  private:
+    control_connection& daemon_;
+    std::mutex mutex_;
+    std::string early_;
+    bool open_ = false;
 };
 
 /// Passes the tasks of the plugin to the jobs, and its updates to the daemon.
 class process_registrar final : public registrar {
   public:
-    process_registrar(process_jobs& jobs, control_connection& daemon) : jobs_(jobs), daemon_(daemon) {}
+    process_registrar(process_jobs& jobs, update_connection& updates) : jobs_(jobs), updates_(updates) {}
 
     void add(registration task) override {
         const auto& info = task.info;
@@ -93,27 +110,27 @@ class process_registrar final : public registrar {
                            .handled = task.async != nullptr});
         jobs_.add(std::move(task));
     }
-    [[nodiscard]] publisher make_publisher() override { return publisher{std::make_shared<sink>(daemon_)}; }
+    [[nodiscard]] publisher make_publisher() override { return publisher{std::make_shared<sink>(updates_)}; }
 
     std::vector<offered_task> offered{};
 
   private:
     class sink final : public detail::update_sink {
       public:
-        explicit sink(control_connection& daemon) noexcept : daemon_(daemon) {}
+        explicit sink(update_connection& updates) noexcept : updates_(updates) {}
         void publish(std::string_view noun, std::string_view json) override {
             std::string line;
             wire_line_writer{line, verb::update, control_task}.parameter("publish").parameter(noun).body(
                 std::string_view{reply_body(json)});
-            daemon_.say(line);
+            updates_.say(line);
         }
 
       private:
-        control_connection& daemon_;
+        update_connection& updates_;
     };
 
     process_jobs& jobs_;
-    control_connection& daemon_;
+    update_connection& updates_;
 };
 
 /// The process: its plugin, and the threads of its lanes.
@@ -124,35 +141,30 @@ class plugin_runner {
 
     // Loads the plugin. False if it cannot be used, which the daemon has been told.
     bool start() {
-        process_registrar tasks{jobs_, daemon_};
+        process_registrar tasks{jobs_, updates_};
         try {
-            const confinement limits{.memory = wanted_.memory,
-                                     .open_files = wanted_.open_files,
-                                     .readable = wanted_.readable,
-                                     .writable = wanted_.writable,
-                                     .threads = lanes_};
             const std::vector<std::filesystem::path> folders(wanted_.folders.begin(), wanted_.folders.end());
-            const auto confined = confine(limits, find_plugin(wanted_.path, folders));
+            auto confined = confine(wanted_.limits, lanes_, find_plugin(wanted_.path, folders), wanted_.require_paths);
             host_.load(wanted_.path, wanted_.config, tasks, wanted_.sha256);
+            start_lanes();
             const auto& loaded = host_.plugins().back();
-            tell("started", started_message{loaded.name, loaded.version, confined, tasks.offered});
+            tell("started", started_message{.name = loaded.name,
+                                            .version = loaded.version,
+                                            .confinement = std::move(confined.in_force),
+                                            .missing = std::move(confined.missing),
+                                            .tasks = tasks.offered});
+            updates_.open();
             return true;
         } catch (const plugin_error& e) {
-            // Without the path, with which the daemon begins the message again.
-            std::string_view why{e.what()};
-            why.remove_prefix(std::min(wanted_.path.size() + 2, why.size()));
-            tell("refused", refused_message{std::string{why}, e.setting()});
+            tell("refused", refused_message{std::string{e.why()}, e.key()});
         } catch (const std::exception& e) {
-            tell("refused", refused_message{e.what(), std::nullopt});
+            tell("refused", refused_message{e.what(), "path"});
         }
         return false;
     }
 
     // Until the daemon ends it.
     void run(line_reader& control) {
-        for (std::size_t i = 0; i < lanes_; ++i) {
-            std::thread{[this, socket = control_descriptor + 1 + static_cast<int>(i)] { serve(socket); }}.detach();
-        }
         while (const auto line = control.next()) {
             const auto read = read_wire_line(*line);
             if (!read || read->parameters.empty()) {
@@ -161,10 +173,10 @@ class plugin_runner {
             const auto& what = read->parameters.front();
             if (what == "cancel") {
                 jobs_.cancel(read->number_at(1));
-            } else if (what == "unwanted") {
-                jobs_.unwanted(read->number_at(1));
+            } else if (what == "progress_unwanted") {
+                jobs_.progress_unwanted(read->number_at(1));
             } else if (what == "answered") {
-                jobs_.resume_elsewhere(*read);
+                jobs_.resume_on_notifier(*read);
             } else if (what == "leaving") {
                 break;
             }
@@ -178,10 +190,27 @@ class plugin_runner {
         options.rules = {.secured = wanted_.secured, .folders = {wanted_.folders.begin(), wanted_.folders.end()}};
         options.folders = options.rules.folders;
         options.trial = std::chrono::milliseconds{0}; // this process is the trial
-        options.log = [this](log_level level, std::string_view, std::string_view text) {
+        options.log = [this](log_level level, std::string_view plugin, std::string_view text) {
+            if (const auto job = process_jobs::traced_here(); job != 0) { // the daemon adds its trace
+                std::string line;
+                wire_line_writer{line, verb::push, control_task}.parameter("log").parameter(job).body(
+                    log_message{static_cast<std::uint32_t>(level), std::string{plugin} + ": " + std::string{text}});
+                daemon_.say(line);
+                return;
+            }
             tell("log", log_message{static_cast<std::uint32_t>(level), std::string{text}});
         };
         return options;
+    }
+
+    void start_lanes() {
+        try {
+            for (std::size_t i = 0; i < lanes_; ++i) {
+                std::thread{[this, socket = control_descriptor + 1 + static_cast<int>(i)] { serve(socket); }}.detach();
+            }
+        } catch (const std::system_error& e) {
+            throw plugin_error(wanted_.path, "cannot start its " + std::to_string(lanes_) + " threads: " + e.what());
+        }
     }
 
     template <class T>
@@ -197,7 +226,7 @@ class plugin_runner {
         while (const auto line = lane.next()) {
             const auto read = read_wire_line(*line);
             if (!read) {
-                ::_exit(not_for_people);
+                ::_exit(exit_wrong_usage);
             }
             std::string reply;
             if (read->task == control_task) {
@@ -212,12 +241,8 @@ class plugin_runner {
             } else {
                 reply = jobs_.serve(*read, wanted_.node);
             }
-            for (std::string_view rest = reply; !rest.empty();) {
-                const auto sent = ::send(socket, rest.data(), rest.size(), MSG_NOSIGNAL);
-                if (sent < 0 && errno != EINTR) {
-                    return; // the daemon has ended
-                }
-                rest.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(sent, 0)));
+            if (send_all(socket, reply) != 0) {
+                return; // the daemon has ended
             }
         }
     }
@@ -225,39 +250,50 @@ class plugin_runner {
     const load_message& wanted_;
     std::size_t lanes_;
     control_connection daemon_{control_descriptor};
+    update_connection updates_{daemon_};
     process_jobs jobs_{daemon_};
     plugin_host host_;
 };
 
+int reject_usage() {
+    std::fputs("clesd: --plugin-process is for internal use; run clesd without it\n", stderr);
+    return exit_wrong_usage;
+}
+
 } // namespace
 
 bool is_plugin_process(int argc, const char* const* argv) noexcept {
-    return argc == 4 && std::string_view{argv[1]} == plugin_process_mode;
+    return argc > 1 && std::string_view{argv[1]} == plugin_process_mode;
 }
 
 int run_plugin_process(int argc, const char* const* argv) {
-    const auto parent = is_plugin_process(argc, argv) ? number_of<pid_t>(argv[2]) : std::nullopt;
-    const auto lanes = parent ? number_of<std::size_t>(argv[3]) : std::nullopt;
+    // A service manager may send these to all processes of the daemon, which ends this one in order.
+    for (const int number : {SIGTERM, SIGINT, SIGHUP, SIGPIPE}) {
+        std::signal(number, SIG_IGN);
+    }
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    const auto parent = argc == 5 ? to_number<pid_t>(argv[2]) : std::nullopt;
+    const auto lanes = parent ? to_number<std::uint16_t>(argv[3]) : std::nullopt;
     if (!lanes) {
-        std::fputs("clesd: the daemon itself starts this\n", stderr);
-        return not_for_people;
+        return reject_usage();
     }
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (::getppid() != *parent) {
-        ::_exit(0); // it has ended already
+        return reject_usage(); // or it has ended already
     }
-    const auto own = static_cast<unsigned>(control_descriptor);
-    const auto others = own + 1 + static_cast<unsigned>(*lanes);
-    ::close_range(others, ~0U, 0);
-    ::close_range(own, others - 1, CLOSE_RANGE_CLOEXEC);
-    std::signal(SIGPIPE, SIG_IGN);
+    const int others = control_descriptor + 1 + *lanes;
+    ::closefrom(others);
+    for (int fd = control_descriptor; fd < others; ++fd) {
+        ::fcntl(fd, F_SETFD, FD_CLOEXEC);
+    }
     line_reader control{control_descriptor};
     const auto first = control.next();
     const auto line = first ? read_wire_line(*first) : std::nullopt;
     load_message wanted;
     if (!line || !from_json(line->body, wanted)) {
-        std::fputs("clesd: the daemon itself starts this\n", stderr);
-        return not_for_people;
+        return reject_usage();
     }
     auto& runner = *new plugin_runner{*lanes, wanted}; // never destroyed: threads may use it
     if (runner.start()) {

@@ -14,7 +14,6 @@
 
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/time.h>
 
 namespace cles::runtime {
 
@@ -28,32 +27,17 @@ constexpr std::size_t max_control_read = 65536;
 // What the process may leave unread. It reads at once, unless it has been stopped.
 constexpr std::size_t max_pending = 64U << 20U;
 constexpr std::size_t max_output_line = 1000;
+// How long the process may take to end after it has closed a connection.
+constexpr std::chrono::milliseconds end_time{100};
 
-// A worker that waits looks this often whether its job is overdue.
-std::chrono::microseconds wait_interval(std::chrono::nanoseconds grace) {
-    return std::clamp<std::chrono::microseconds>(std::chrono::ceil<std::chrono::microseconds>(grace) / 8, 2ms, 100ms);
-}
-
-void set_socket_timeouts(int socket, std::chrono::microseconds span) {
-    const timeval value{.tv_sec = span.count() / 1'000'000, .tv_usec = span.count() % 1'000'000};
-    ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &value, sizeof value);
-    ::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &value, sizeof value);
+// How often jobs are examined.
+std::chrono::nanoseconds watch_interval(std::chrono::nanoseconds grace) {
+    return std::clamp<std::chrono::nanoseconds>(grace / 8, 2ms, 100ms);
 }
 
 std::string grace_text(std::chrono::nanoseconds span) {
     const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(span).count();
     return ms % 1000 == 0 ? std::to_string(ms / 1000) + " s" : std::to_string(ms) + " ms";
-}
-
-// Takes the first whole line, without its LF. False if there is none.
-bool take_line(std::string& input, std::string& line) {
-    const auto end = input.find('\n');
-    if (end == std::string::npos) {
-        return false;
-    }
-    line.assign(input, 0, end);
-    input.erase(0, end + 1);
-    return true;
 }
 
 void append_request(std::string& to, std::uint64_t id, const request& what) {
@@ -76,6 +60,9 @@ void append_request(std::string& to, std::uint64_t id, const request& what) {
     if (peer.local) {
         line.adverb("local", std::int64_t{1});
     }
+    if (!what.trace().empty()) {
+        line.adverb("trace", what.trace());
+    }
     line.body(what.body());
 }
 
@@ -85,22 +72,24 @@ std::string job_label(const request& what) {
 
 } // namespace
 
+std::chrono::nanoseconds patience_of(std::chrono::nanoseconds grace) {
+    return std::max(grace - 2 * watch_interval(grace), grace / 2);
+}
+
 plugin_session::plugin_session(asio::any_io_executor executor, std::string name, session_options options,
                                session_events events)
     : executor_(std::move(executor)), options_(std::move(options)), events_(std::move(events)),
-      process_(options_.program, options_.lanes), control_(process_.control.get()), output_(process_.output.get()),
-      name_(std::move(name)), lanes_(options_.lanes) {
-    const auto interval = wait_interval(options_.grace);
+      process_(options_.program, options_.plugin, options_.lanes), control_(process_.control.get()),
+      output_(process_.output.get()), name_(std::move(name)), lanes_(options_.lanes) {
     for (std::size_t i = 0; i < lanes_.size(); ++i) {
         lanes_[i].socket = process_.lanes[i].get();
-        set_socket_timeouts(lanes_[i].socket, interval);
         free_lanes_.push_back(&lanes_[i]);
     }
 }
 
 // -- jobs, on workers ----------------------------------------------------------------------------------------------
 
-plugin_session::lane* plugin_session::take_lane() {
+plugin_session::lane* plugin_session::take_lane(const std::shared_ptr<const job>& by) {
     std::unique_lock lock{mutex_};
     // There are as many as workers, so one becomes free soon.
     lane_freed_.wait(lock, [this] { return !free_lanes_.empty() || ended_; });
@@ -109,22 +98,24 @@ plugin_session::lane* plugin_session::take_lane() {
     }
     auto* taken = free_lanes_.back(); // the one that was used last
     free_lanes_.pop_back();
+    taken->used_by = by;
     return taken;
 }
 
 void plugin_session::give_back(lane* used) {
     const std::scoped_lock lock{mutex_};
+    used->used_by.reset();
     free_lanes_.push_back(used);
     lane_freed_.notify_one();
 }
 
 bool plugin_session::serve(const request& what, const responder& answer) {
-    auto* on = take_lane();
+    const auto until = what.deadline() == time_point{} ? time_point::max() : what.deadline();
+    const auto here = std::make_shared<job>(answer, job_label(what), until);
+    auto* on = take_lane(here);
     if (on == nullptr) {
         return false;
     }
-    const auto until = what.deadline() == time_point{} ? time_point::max() : what.deadline();
-    const auto here = std::make_shared<job>(answer, job_label(what), until);
     const auto id = ++last_id_;
     {
         const std::scoped_lock lock{mutex_};
@@ -138,7 +129,7 @@ bool plugin_session::serve(const request& what, const responder& answer) {
     std::string line;
     append_request(line, id, what);
     std::string reply;
-    const auto how = exchange(*on, line, *here, reply);
+    const auto how = exchange(*on, line, reply);
     if (how != exchanged::replied) {
         // Nothing else uses the lane any more.
         const bool started = how == exchanged::lost;
@@ -170,60 +161,34 @@ bool plugin_session::serve(const request& what, const responder& answer) {
 }
 
 // Sends a line, and waits for the line that answers it: when the handler, or the callback, has returned.
-plugin_session::exchanged plugin_session::exchange(lane& on, std::string_view line, const job& by, std::string& reply) {
-    // An error after the process has ended says whether it had read what was sent.
-    const auto lost = [](int code) {
-        return code == EPIPE || code == ECONNRESET ? exchanged::unread : exchanged::lost;
-    };
-    const auto waits = [&](int code) {
-        if ((code != EAGAIN && code != EINTR) || ended_) {
-            return false; // or another process still holds the other end
-        }
-        kill_if_overdue(by);
-        return true;
-    };
-    while (!line.empty()) {
-        const auto sent = ::send(on.socket, line.data(), line.size(), MSG_NOSIGNAL);
-        if (sent >= 0) {
-            line.remove_prefix(static_cast<std::size_t>(sent));
-        } else if (!waits(errno)) {
-            ended_ = true;
-            return lost(errno);
-        }
+plugin_session::exchanged plugin_session::exchange(lane& on, std::string_view line, std::string& reply) {
+    if (const auto code = send_all(on.socket, line); code != 0) {
+        return lose(code);
     }
-    std::array<char, 4096> part; // NOLINT(*-member-init): it is written before it is read
-    while (!take_line(on.input, reply)) {
+    for (;;) {
+        if (const auto whole = on.input.next()) {
+            reply = *whole;
+            return exchanged::replied;
+        }
+        std::array<char, 4096> part; // NOLINT(*-member-init): it is written before it is read
         const auto size = ::recv(on.socket, part.data(), part.size(), 0);
         if (size > 0) {
-            on.input.append(part.data(), static_cast<std::size_t>(size));
-            if (on.input.size() > options_.max_line) {
+            on.input.append({part.data(), static_cast<std::size_t>(size)});
+            if (on.input.rest().size() > options_.max_line) {
                 kill("it sent a line of more than " + std::to_string(options_.max_line) + " bytes");
-                return exchanged::lost;
+                return lose(0);
             }
-        } else if (size == 0 || !waits(errno)) {
-            ended_ = true;
-            return size == 0 ? exchanged::lost : lost(errno);
+        } else if (size == 0 || errno != EINTR) {
+            return lose(size == 0 ? 0 : errno);
         }
-    }
-    return exchanged::replied;
-}
-
-void plugin_session::kill_if_overdue(const job& by) {
-    const auto due = by.due.load();
-    // Somewhat earlier, so that the pool does not take its worker for stuck.
-    if (due != time_point::max() && clock::now() - due > options_.grace - 2 * wait_interval(options_.grace)) {
-        kill(by.label + " did not end within " + grace_text(options_.grace) + " of its deadline or cancellation");
     }
 }
 
-void plugin_session::kill(const std::string& why) {
-    {
-        const std::scoped_lock lock{mutex_};
-        if (killed_because_.empty()) {
-            killed_because_ = why;
-        }
-    }
-    process_.kill();
+// The process has closed a lane: it ends, or has to. An error says whether it had read what was sent.
+plugin_session::exchanged plugin_session::lose(int code) {
+    ended_ = true;
+    process_.end();
+    return code == EPIPE || code == ECONNRESET ? exchanged::unread : exchanged::lost;
 }
 
 std::shared_ptr<plugin_session::job> plugin_session::take(std::uint64_t id) {
@@ -257,15 +222,9 @@ void plugin_session::settle(const job& of, std::string_view body) {
     }
 }
 
-std::string plugin_session::how_it_ended() {
-    const auto how = process_.end();
-    const std::scoped_lock lock{mutex_};
-    return killed_because_.empty() ? how : "was ended because " + killed_because_;
-}
-
 // The process has ended.
 void plugin_session::fail(const job& of) {
-    const auto how = how_it_ended();
+    const auto how = process_.end().text();
     std::string name;
     std::string left;
     {
@@ -294,12 +253,15 @@ void plugin_session::stop(std::uint64_t id) {
 
 // Runs a callback of a job that has started. Called on a worker, as a part of the job.
 void plugin_session::resume(const std::shared_ptr<job>& by, std::string_view line) {
-    auto* on = take_lane();
+    // Nobody blames it for the time that it has waited.
+    by->due = std::max(by->due.load(), clock::now());
+    --by->waits;
+    auto* on = take_lane(by);
     if (on == nullptr) {
         return; // the job has been answered
     }
     std::string reply;
-    if (exchange(*on, line, *by, reply) == exchanged::replied) {
+    if (exchange(*on, line, reply) == exchanged::replied) {
         give_back(on);
     }
 }
@@ -314,7 +276,7 @@ void plugin_session::say(std::string_view lines) {
     pending_.append(lines);
     send_pending();
     if (pending_.size() > max_pending) {
-        process_.kill();
+        kill("it left " + std::to_string(max_pending >> 20U) + " MiB unread");
     } else if (!pending_.empty() && control_stream_ && !std::exchange(write_wait_, true)) {
         asio::post(executor_, [self = shared_from_this()] { self->wait_to_write(); });
     }
@@ -379,45 +341,143 @@ std::size_t plugin_session::open_jobs() const {
 }
 
 bool plugin_session::wait_for_start(std::chrono::milliseconds limit) {
-    const auto end = std::chrono::steady_clock::now() + limit;
-    while (!answered_load_) {
-        const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
-        if (left.count() <= 0) {
-            kill("it did not start in time");
-            return false;
+    const bool in_time = read_until(std::chrono::steady_clock::now() + limit, [this] { return answered_load_; });
+    if (!in_time) {
+        kill("it did not start in time");
+    }
+    return in_time;
+}
+
+// Reads what it says and sends what is pending, without the executor, until that is so or the process has ended. False
+// if the time was up.
+bool plugin_session::read_until(std::chrono::steady_clock::time_point until, const std::function<bool()>& done) {
+    while (!done()) {
+        short control_events = control_closed_ == time_point::max() ? POLLIN : 0;
+        {
+            const std::scoped_lock lock{out_mutex_};
+            control_events = static_cast<short>(control_events | (pending_.empty() ? 0 : POLLOUT));
         }
-        std::array<pollfd, 2> watched{
-            {{.fd = control_, .events = POLLIN, .revents = 0}, {.fd = output_, .events = POLLIN, .revents = 0}}};
-        if (::poll(watched.data(), watched.size(), static_cast<int>(left.count())) <= 0) {
-            continue;
-        }
-        if (watched[0].revents != 0 && !read_control()) {
-            ended_ = true;
+        std::array<pollfd, 3> watched{
+            {{.fd = process_.handle(), .events = POLLIN, .revents = 0},
+             {.fd = control_events == 0 ? -1 : control_, .events = control_events, .revents = 0},
+             {.fd = output_, .events = POLLIN, .revents = 0}}};
+        const auto& [ended, control, output] = watched;
+        const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
+        const auto ready = ::poll(watched.data(), watched.size(), static_cast<int>(std::max(left, 0ms).count()));
+        if (ended.revents != 0) {
+            read_rest();
             return true;
         }
-        if (watched[1].revents != 0) {
+        if (left <= 0ms) {
+            return false;
+        }
+        if (ready <= 0) {
+            continue;
+        }
+        if ((control.revents & POLLOUT) != 0) {
+            const std::scoped_lock lock{out_mutex_};
+            send_pending();
+        }
+        if ((control.revents & ~POLLOUT) != 0 && !read_control()) {
+            control_closed_ = clock::now();
+        }
+        if (output.revents != 0) {
             read_output();
         }
     }
     return true;
 }
 
+// What it said last. A process that it has started may still hold the connection, so this has a limit.
+void plugin_session::read_rest() {
+    pollfd said{.fd = control_, .events = POLLIN, .revents = 0};
+    for (int i = 0; i < 64 && ::poll(&said, 1, 0) > 0 && read_control(); ++i) {
+    }
+    if (output_ >= 0) {
+        read_output();
+    }
+}
+
 void plugin_session::run() {
     control_stream_.emplace(executor_, process_.control.release());
     output_stream_.emplace(executor_, process_.output.release());
     end_stream_.emplace(executor_, ::dup(process_.handle()));
+    read_pause_.emplace(executor_);
+    watch_.emplace(executor_);
     wait_to_read();
     wait_for_output();
     wait_for_end();
+    watch_jobs();
+    const std::scoped_lock lock{out_mutex_};
+    write_wait_ = !pending_.empty();
+    if (write_wait_) {
+        wait_to_write();
+    }
 }
 
 void plugin_session::wait_to_read() {
     control_stream_->async_wait(asio::posix::stream_descriptor::wait_read,
                                 [self = shared_from_this()](boost::system::error_code failed) {
-                                    if (!failed && self->control_stream_ && self->read_control()) {
-                                        self->wait_to_read();
+                                    if (failed || !self->control_stream_) {
+                                        return;
+                                    }
+                                    const auto begun = clock::now();
+                                    if (self->read_control()) {
+                                        self->pause_reading(clock::now() - begun);
+                                    } else {
+                                        self->control_closed_ = clock::now();
                                     }
                                 });
+}
+
+// What it says gets half of the executor's time at most, however much that is.
+void plugin_session::pause_reading(std::chrono::nanoseconds span) {
+    if (span < 200us) {
+        wait_to_read();
+        return;
+    }
+    read_pause_->expires_after(span);
+    read_pause_->async_wait([self = shared_from_this()](boost::system::error_code failed) {
+        if (!failed && self->control_stream_) {
+            self->wait_to_read();
+        }
+    });
+}
+
+void plugin_session::watch_jobs() {
+    watch_->expires_after(watch_interval(options_.grace));
+    watch_->async_wait([self = shared_from_this()](boost::system::error_code failed) {
+        if (!failed && self->watch_) {
+            self->kill_if_overdue();
+            self->watch_jobs();
+        }
+    });
+}
+
+// Both those whose code runs, although they may have been answered, and those whose handlers have returned. A job that
+// waits for another node, or for a worker to continue, does nothing meanwhile.
+void plugin_session::kill_if_overdue() {
+    const auto now = clock::now();
+    if (now - control_closed_ > end_time) {
+        kill("it closed a connection");
+    }
+    const auto patience = patience_of(options_.grace);
+    const auto check = [&](const job& of) {
+        if (now - of.due.load() > patience) {
+            kill(of.label + " did not end within " + grace_text(options_.grace) + " of its deadline or cancellation");
+        }
+    };
+    const std::scoped_lock lock{mutex_};
+    for (const auto& each : lanes_) {
+        if (each.used_by) {
+            check(*each.used_by);
+        }
+    }
+    for (const auto& [id, each] : jobs_) {
+        if (!each->on_lane && each->waits == 0) {
+            check(*each);
+        }
+    }
 }
 
 void plugin_session::wait_for_output() {
@@ -452,14 +512,11 @@ bool plugin_session::read_control() {
     if (size == 0) {
         return false;
     }
-    input_.append(part, 0, static_cast<std::size_t>(size));
-    std::size_t begin = 0;
-    for (auto end = input_.find('\n'); end != std::string::npos; end = input_.find('\n', begin)) {
-        on_line(std::string_view{input_}.substr(begin, end - begin));
-        begin = end + 1;
+    input_.append({part.data(), static_cast<std::size_t>(size)});
+    while (const auto line = input_.next()) {
+        on_line(*line);
     }
-    input_.erase(0, begin);
-    if (input_.size() > options_.max_line) {
+    if (input_.rest().size() > options_.max_line) {
         kill("it sent a line of more than " + std::to_string(options_.max_line) + " bytes");
         return false;
     }
@@ -472,13 +529,12 @@ void plugin_session::read_output() {
     if (size == 0 || (size < 0 && errno != EAGAIN && errno != EINTR)) {
         output_ = -1;
     }
-    output_text_.append(part.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
-    std::string line;
-    while (take_line(output_text_, line)) {
-        events_.output(line);
+    output_text_.append({part.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))});
+    while (const auto line = output_text_.next()) {
+        events_.output(*line);
     }
-    if (output_text_.size() > max_output_line || (output_ < 0 && !output_text_.empty())) {
-        events_.output(output_text_);
+    if (const auto rest = output_text_.rest(); rest.size() > max_output_line || (output_ < 0 && !rest.empty())) {
+        events_.output(rest);
         output_text_.clear();
     }
 }
@@ -506,14 +562,14 @@ void plugin_session::on_reply(const wire_line& line) {
     }
     const auto of = find(line.id);
     double fraction = 0;
-    if (!of || of->unwanted || !json_reader{progress}.read(fraction)) {
+    if (!of || of->progress_unwanted || !json_reader{progress}.read(fraction)) {
         return;
     }
     if (!of->answer.progress(fraction, json_text{std::string{line.body}}) && !of->answer.stopped()) {
-        of->unwanted = true;
+        of->progress_unwanted = true;
         std::string answer;
         wire_line_writer{answer, verb::push, control_task}
-            .parameter("unwanted")
+            .parameter("progress_unwanted")
             .parameter(line.id)
             .adverb("reply", "no")
             .body("{}");
@@ -544,11 +600,8 @@ void plugin_session::on_request(const wire_line& line) {
     } else if (what == "log") {
         const auto entry = body_of<log_message>(line);
         const auto level = static_cast<log_level>(std::min<std::uint32_t>(entry.level, 3));
-        if (const auto of = find(line.number_at(1))) {
-            of->answer.log(level, entry.text);
-        } else {
-            events_.log(level, entry.text);
-        }
+        const auto of = find(line.number_at(1));
+        events_.log(level, std::string_view{entry.text}.substr(0, max_log_text), of ? &of->answer : nullptr);
     } else if (what == "started" && !answered_load_) {
         answered_load_ = true;
         events_.started(body_of<started_message>(line));
@@ -591,8 +644,10 @@ void plugin_session::ask(const wire_line& line) {
         answered(nullptr, errc::busy, "{}", "too many requests at once");
         return;
     }
+    ++by->waits;
     call_options options;
-    options.urgent(wanted.urgent).at(wanted.at).deadline(std::chrono::milliseconds{wanted.deadline_ms});
+    options.urgent(wanted.urgent).at(wanted.at).hops(wanted.hops);
+    options.deadline(std::chrono::milliseconds{wanted.deadline_ms});
     if (wanted.progress) {
         options.on_progress([weak = weak_from_this(), by, ticket](double fraction, std::string_view json) {
             if (const auto self = weak.lock()) {
@@ -605,6 +660,7 @@ void plugin_session::ask(const wire_line& line) {
                     .adverb("progress", number)
                     .body(json);
                 self->resume(by, text);
+                ++by->waits;
             }
         });
     }
@@ -625,13 +681,10 @@ void plugin_session::finish() {
         return;
     }
     ended_ = true;
-    const auto how = how_it_ended();
-    // What it said last. A process that it has started may still hold the connection, so this has a limit.
-    pollfd said{.fd = control_, .events = POLLIN, .revents = 0};
-    for (int i = 0; i < 64 && ::poll(&said, 1, 0) > 0 && read_control(); ++i) {
-    }
-    if (output_ >= 0) {
-        read_output();
+    const auto how = process_.end();
+    read_rest();
+    for (const auto& each : lanes_) {
+        ::shutdown(each.socket, SHUT_RDWR); // another process may still hold the other end
     }
     std::vector<std::shared_ptr<job>> left;
     {
@@ -655,19 +708,18 @@ void plugin_session::finish() {
     }
     output_stream_.reset();
     end_stream_.reset();
+    read_pause_.reset();
+    watch_.reset();
     events_.ended(how);
 }
 
 bool plugin_session::close(std::chrono::steady_clock::time_point until) {
-    bool late = false;
-    pollfd watched{.fd = process_.handle(), .events = POLLIN, .revents = 0};
-    while (!finished_) {
-        const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
-        const auto ready = ::poll(&watched, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
-        late = ready == 0;
-        if (ready >= 0) {
-            break;
-        }
+    if (finished_) {
+        return false;
+    }
+    const bool late = !read_until(until, [] { return false; });
+    if (late) {
+        kill("it did not stop in time");
     }
     finish();
     return late;

@@ -6,12 +6,14 @@
 #include <cles/request.hpp>
 #include <cles/responder.hpp>
 
+#include "isolation/line_buffer.hpp"
 #include "isolation/plugin_messages.hpp"
 #include "isolation/plugin_process.hpp"
 #include "isolation/wire_line.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/unordered/unordered_flat_map.hpp>
 
 #include <atomic>
@@ -31,21 +33,26 @@ namespace cles::runtime {
 
 struct session_options {
     std::string program;              ///< see `plugin_process`
+    std::string plugin;               ///< its file
     std::size_t lanes = 1;            ///< how many jobs may run at once
     std::chrono::nanoseconds grace{}; ///< for jobs to end after their deadline
     std::size_t max_line = 4U << 20U; ///< bytes that the process may send in one line
     std::size_t max_asks = 4096;      ///< requests that its jobs may wait for
 };
 
+/// How long a job may take to end after its deadline. Somewhat shorter than the grace, so that the pool does not take
+/// its worker for stuck.
+std::chrono::nanoseconds patience_of(std::chrono::nanoseconds grace);
+
 /// What happens in the process of a plugin. All are called on the executor.
 struct session_events {
     std::function<void(const started_message&)> started;
     std::function<void(const refused_message&)> refused;
-    std::function<void(log_level, std::string_view)> log;
-    std::function<void(std::string_view text)> output; ///< a line of its stdout or stderr
+    std::function<void(log_level, std::string_view, const responder* job)> log; ///< null: it is about no job
+    std::function<void(std::string_view text)> output;                          ///< a line of its stdout or stderr
     std::function<void(std::string_view noun, std::string_view json)> publish;
     /// The last one: it has ended, and all its jobs have been answered.
-    std::function<void(const std::string& how)> ended;
+    std::function<void(const process_end& how)> ended;
 };
 
 /// One run of the process of an isolated plugin, from its start to its end: the daemon's side of the jobs in it.
@@ -67,7 +74,7 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
     /// Waits for `started`, `refused` or the end, without the executor. Only before `run`. False if the time was up,
     /// and the process is killed then.
     bool wait_for_start(std::chrono::milliseconds limit);
-    /// From now on, reads what it says.
+    /// From now on, reads what it says, and watches its jobs.
     void run();
     void set_name(std::string name);
     /// Asks the process to stop the plugin and to end. Its jobs are answered `unavailable`.
@@ -84,13 +91,9 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
     /// has ended.
     bool serve(const request& what, const responder& answer);
     /// Ends the process because of what it does.
-    void kill(const std::string& why);
+    void kill(std::string_view why) { process_.kill(why); }
 
   private:
-    struct lane {
-        int socket = -1;
-        std::string input;
-    };
     // A job whose requester waits.
     struct job {
         job(responder by, std::string what, time_point until)
@@ -100,29 +103,39 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
         std::string label;               // PULL 'speed'
         std::atomic<time_point> due;     // by when it should have ended
         std::atomic<bool> on_lane{true}; // its worker answers it if the process ends
-        bool unwanted = false;           // its reports are not wanted; used on the executor
+        std::atomic<int> waits{0};       // for the answers to requests that it has sent
+        bool progress_unwanted = false;  // used on the executor
+    };
+    struct lane {
+        int socket = -1;
+        line_buffer input{};
+        std::shared_ptr<const job> used_by{}; // which may have been answered
     };
     enum class exchanged : std::uint8_t { replied, unread, lost };
 
-    lane* take_lane();
+    lane* take_lane(const std::shared_ptr<const job>& by);
     void give_back(lane* used);
-    exchanged exchange(lane& on, std::string_view line, const job& by, std::string& reply);
-    void kill_if_overdue(const job& by);
+    exchanged exchange(lane& on, std::string_view line, std::string& reply);
+    exchanged lose(int code);
     std::shared_ptr<job> take(std::uint64_t id);
     [[nodiscard]] std::shared_ptr<job> find(std::uint64_t id);
     void settle(const job& of, std::string_view body);
     void fail(const job& of);
     void stop(std::uint64_t id);
     void resume(const std::shared_ptr<job>& by, std::string_view line);
-    [[nodiscard]] std::string how_it_ended();
 
     // Says something on the control connection.
     void say(std::string_view lines);
     void send_pending();
     void wait_to_write();
     void wait_to_read();
+    void pause_reading(std::chrono::nanoseconds span);
     void wait_for_output();
     void wait_for_end();
+    void watch_jobs();
+    void kill_if_overdue();
+    bool read_until(std::chrono::steady_clock::time_point until, const std::function<bool()>& done);
+    void read_rest();
     bool read_control();
     void read_output();
     void on_line(std::string_view line);
@@ -141,9 +154,12 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
     std::optional<boost::asio::posix::stream_descriptor> control_stream_;
     std::optional<boost::asio::posix::stream_descriptor> output_stream_;
     std::optional<boost::asio::posix::stream_descriptor> end_stream_;
-    std::string input_;
-    std::string output_text_;
-    bool answered_load_ = false; // it has said `started` or `refused`
+    std::optional<boost::asio::steady_timer> read_pause_;
+    std::optional<boost::asio::steady_timer> watch_;
+    line_buffer input_;
+    line_buffer output_text_;
+    time_point control_closed_ = time_point::max(); // when the process closed the connection
+    bool answered_load_ = false;                    // it has said `started` or `refused`
     bool finished_ = false;
 
     std::atomic<bool> ended_{false};
@@ -152,7 +168,6 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
 
     mutable std::mutex mutex_; // of all that follows
     std::string name_;
-    std::string killed_because_;
     std::string left_because_; // not empty: the daemon ends it
     boost::unordered_flat_map<std::uint64_t, std::shared_ptr<job>> jobs_;
     std::vector<lane> lanes_;

@@ -6,26 +6,23 @@
 #include <cles/json_writer.hpp>
 #include <cles/limits.hpp>
 
+#include "isolation/descriptor.hpp"
 #include "isolation/plugin_messages.hpp"
 
-#include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <exception>
 #include <optional>
 #include <vector>
 
-#include <sys/socket.h>
 #include <unistd.h>
 
 namespace cles::runtime {
 namespace {
 
 constexpr std::size_t max_cancelled_early = 256;
-constexpr std::size_t max_log_text = 4096;
 
-thread_local std::uint64_t lines_said = 0;
+thread_local std::uint64_t lines_sent = 0;
 
 identity peer_of(const wire_line& line) {
     identity peer{.transport = std::string{line.adverb("transport")},
@@ -42,19 +39,14 @@ identity peer_of(const wire_line& line) {
 } // namespace
 
 void control_connection::say(std::string_view lines) {
-    ++lines_said;
+    ++lines_sent;
     const std::scoped_lock lock{mutex_};
-    while (!lines.empty()) {
-        const auto sent = ::send(socket_, lines.data(), lines.size(), MSG_NOSIGNAL);
-        if (sent >= 0) {
-            lines.remove_prefix(static_cast<std::size_t>(sent));
-        } else if (errno != EINTR) {
-            ::_exit(0); // the daemon has ended
-        }
+    if (send_all(socket_, lines) != 0) {
+        ::_exit(0); // the daemon has ended
     }
 }
 
-std::uint64_t control_connection::said_here() noexcept { return lines_said; }
+std::uint64_t control_connection::lines_sent_by_this_thread() noexcept { return lines_sent; }
 
 // -- a job ---------------------------------------------------------------------------------------------------------
 
@@ -62,7 +54,7 @@ std::uint64_t control_connection::said_here() noexcept { return lines_said; }
 // from inside the handler goes over the handler's lane.
 class process_jobs::call final : public detail::call_control {
   public:
-    call(process_jobs& jobs, std::uint64_t id) noexcept : jobs_(jobs), id_(id) {}
+    call(process_jobs& jobs, std::uint64_t id, bool traced) noexcept : jobs_(jobs), id_(id), traced_(traced) {}
     call(const call&) = delete;
     call& operator=(const call&) = delete;
     ~call() override {
@@ -90,7 +82,7 @@ class process_jobs::call final : public detail::call_control {
         }
     }
     bool progress(double fraction, std::string_view json) override {
-        if (stopped_ || answered_ || unwanted_) {
+        if (stopped_ || answered_ || progress_unwanted_) {
             return false;
         }
         std::string number;
@@ -121,6 +113,7 @@ class process_jobs::call final : public detail::call_control {
             ask_message{.command = std::string{command},
                         .at = options.at_,
                         .urgent = options.urgent_,
+                        .hops = options.hops_,
                         .deadline_ms = options.deadline_.count(),
                         .progress = options.on_progress_ != nullptr});
         jobs_.daemon_.say(line);
@@ -136,11 +129,17 @@ class process_jobs::call final : public detail::call_control {
     /// The handler begins on this thread.
     void begin() noexcept {
         current = this;
-        said_before_ = control_connection::said_here();
+        sent_before_ = control_connection::lines_sent_by_this_thread();
     }
-    /// The handler has returned. Returns its reply, if it goes over the lane.
-    std::optional<std::string> end() noexcept {
+    /// The handler has returned. Returns its reply, if it goes over the lane: not if what it has logged after that has
+    /// to be read before the job ends.
+    std::optional<std::string> end() {
         current = nullptr;
+        if (traced_ && direct_ && sent_before_ != control_connection::lines_sent_by_this_thread()) {
+            std::string line;
+            wire_line_writer{line, id_}.body(*std::exchange(direct_, std::nullopt));
+            jobs_.daemon_.say(line);
+        }
         return std::move(direct_);
     }
     /// The requester waits no more. Returns the callback, to be called on a thread where it may take long.
@@ -149,13 +148,17 @@ class process_jobs::call final : public detail::call_control {
         stopped_ = true;
         return std::exchange(on_stop_, nullptr);
     }
-    void set_unwanted() noexcept { unwanted_ = true; }
+    void set_progress_unwanted() noexcept { progress_unwanted_ = true; }
+
+    [[nodiscard]] static std::uint64_t traced_here() noexcept {
+        return current != nullptr && current->traced_ ? current->id_ : 0;
+    }
 
   private:
     static thread_local const call* current;
 
     void answer(std::string body) {
-        if (current == this && said_before_ == control_connection::said_here()) {
+        if (current == this && sent_before_ == control_connection::lines_sent_by_this_thread()) {
             direct_ = std::move(body);
         } else {
             std::string line;
@@ -169,16 +172,19 @@ class process_jobs::call final : public detail::call_control {
 
     process_jobs& jobs_;
     const std::uint64_t id_;
+    const bool traced_;
     std::atomic<bool> answered_{false};
     std::atomic<bool> stopped_{false};
-    std::atomic<bool> unwanted_{false};
-    std::uint64_t said_before_ = 0;
+    std::atomic<bool> progress_unwanted_{false};
+    std::uint64_t sent_before_ = 0;
     std::optional<std::string> direct_{};
     std::mutex mutex_;
     std::function<void()> on_stop_{};
 };
 
 thread_local const process_jobs::call* process_jobs::call::current = nullptr;
+
+std::uint64_t process_jobs::traced_here() noexcept { return call::traced_here(); }
 
 // -- on lanes ------------------------------------------------------------------------------------------------------
 
@@ -189,7 +195,8 @@ void process_jobs::add(registration task) {
 }
 
 std::string process_jobs::serve(const wire_line& line, std::string_view node) {
-    const auto handled = std::make_shared<call>(*this, line.id);
+    const auto trace = line.adverb("trace");
+    const auto handled = std::make_shared<call>(*this, line.id, !trace.empty());
     {
         const std::scoped_lock lock{mutex_};
         calls_.emplace(line.id, handled.get());
@@ -208,6 +215,7 @@ std::string process_jobs::serve(const wire_line& line, std::string_view node) {
         .body = line.body,
         .peer = &peer,
         .deadline = due ? time_point{time_point::duration{*due}} : time_point{},
+        .trace = trace,
     };
     handled->begin();
     try {
@@ -281,14 +289,14 @@ void process_jobs::cancel(std::uint64_t id) {
     }
 }
 
-void process_jobs::unwanted(std::uint64_t id) {
+void process_jobs::progress_unwanted(std::uint64_t id) {
     const std::scoped_lock lock{mutex_};
     if (const auto found = calls_.find(id); found != calls_.end()) {
-        found->second->set_unwanted();
+        found->second->set_progress_unwanted();
     }
 }
 
-void process_jobs::resume_elsewhere(const wire_line& line) {
+void process_jobs::resume_on_notifier(const wire_line& line) {
     // The copy's views are of its own text.
     const auto kept = std::make_shared<wire_line>(line);
     const auto text = std::make_shared<std::string>(line.body);

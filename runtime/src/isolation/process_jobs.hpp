@@ -33,8 +33,8 @@ class control_connection {
 
     /// Waits until the daemon has read enough to take it.
     void say(std::string_view lines);
-    /// How many lines this thread has said, to keep what follows in order.
-    [[nodiscard]] static std::uint64_t said_here() noexcept;
+    /// To keep what follows in order.
+    [[nodiscard]] static std::uint64_t lines_sent_by_this_thread() noexcept;
 
   private:
     int socket_;
@@ -55,14 +55,16 @@ class process_jobs {
     /// Runs the handler of a request from a lane. Returns the line that ends it there: its reply, or that it replies
     /// later.
     std::string serve(const wire_line& line, std::string_view node);
+    /// The job whose handler runs on this thread, if it is traced; else 0.
+    [[nodiscard]] static std::uint64_t traced_here() noexcept;
     /// Runs a callback of a job: a request that it has sent is answered, or reports progress.
     void resume(const wire_line& line);
 
     // From the control connection:
     void cancel(std::uint64_t id);
-    void unwanted(std::uint64_t id);
+    void progress_unwanted(std::uint64_t id);
     /// The same as `resume`, on another thread.
-    void resume_elsewhere(const wire_line& line);
+    void resume_on_notifier(const wire_line& line);
 
   private:
     class call;

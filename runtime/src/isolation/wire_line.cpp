@@ -57,16 +57,6 @@ std::optional<std::string> decode(std::string_view text) {
     return out;
 }
 
-template <class Integer>
-std::optional<Integer> to_number(std::string_view text) noexcept {
-    Integer number{};
-    const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (failed != std::errc{} || end != text.data() + text.size()) {
-        return std::nullopt;
-    }
-    return number;
-}
-
 // Takes the text up to the next space.
 std::string_view take_word(std::string_view& rest) noexcept {
     const auto end = std::min(rest.find(' '), rest.size());

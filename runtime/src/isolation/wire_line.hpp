@@ -4,12 +4,14 @@
 #include <cles/convert.hpp>
 #include <cles/verb.hpp>
 
+#include <charconv>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -17,6 +19,14 @@
 /// (docs/protocol.md), with adverbs of their own; runtime/README.md lists them.
 
 namespace cles::runtime {
+
+/// A decimal number; nothing if the text is anything else.
+template <class Integer>
+std::optional<Integer> to_number(std::string_view text) noexcept {
+    Integer number{};
+    const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), number);
+    return failed == std::errc{} && end == text.data() + text.size() ? std::optional{number} : std::nullopt;
+}
 
 /// Appends one line to a buffer. Parameters and the values of adverbs are percent-encoded.
 class wire_line_writer {

@@ -3,6 +3,7 @@
 
 #include <cles/limits.hpp>
 
+#include "jobs/current_trace.hpp"
 #include "jobs/service_time.hpp"
 
 #include <boost/asio/execution/outstanding_work.hpp>
@@ -21,7 +22,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// How many waiting jobs are looked at for one that another node wants, so that the queue is not locked for long.
+// How many waiting jobs are offered to another node, so that the queue is not locked for long.
 constexpr std::size_t most_offered = 256;
 
 // After so many jobs of one burst further workers are woken at once, and not when the burst has been read.
@@ -135,6 +136,12 @@ void job_dispatcher::submit(const request& what, responder answer, std::shared_p
     pauses_.count_input();
     auto& r = acquire_record();
     r.assign(what, records_.copy_of(what.peer()), std::move(task));
+    const auto call = sharing_ ? answer.node_call() : nullptr;
+    r.movable = call && sharing_->may_move(*call);
+    r.note_phase(job_times::phase::queued);
+    if (!what.trace().empty()) {
+        answer.record_times({}, {}); // they follow
+    }
     const auto admission = workers_.push(r);
     if (admission == worker_pool::admission::full || admission == worker_pool::admission::no_workers) {
         r.answered_ = true;
@@ -239,6 +246,7 @@ void job_dispatcher::release_record(job_record& r) {
 
 job_dispatcher::stopped_job job_dispatcher::stop(job_record& r) {
     pauses_.count_input();
+    r.report_times();
     awaited_ -= r.requester_ && !r.stopped() ? 1 : 0;
     auto callback = r.stop();
     const bool moved = r.moved_ != 0;
@@ -270,9 +278,12 @@ job_dispatcher::stopped_job job_dispatcher::stop(job_record& r) {
 shareable_queue::state job_dispatcher::read_state() const {
     const auto workers = workers_.read_figures();
     return {.waiting = workers.queued,
-            .idle = draining_ ? 0 : workers.usable - std::min(workers.running, workers.usable),
+            .idle = workers.usable - std::min(workers.running, workers.usable),
             .workers = workers.usable,
-            .service_time = expected_service_time(workers)};
+            .service_time = expected_service_time(workers),
+            .movable = workers.movable,
+            .movable_queued = workers.movable_queued,
+            .draining = draining_};
 }
 
 void job_dispatcher::offer(job_taker& to) {
@@ -280,10 +291,12 @@ void job_dispatcher::offer(job_taker& to) {
         most_offered,
         [&](const job_record& r, std::size_t ahead) {
             const auto call = r.requester_ ? r.requester_->node_call() : nullptr;
-            return call && to.wants(*call, ahead);
+            return call && to.choose(*call, ahead);
         },
         [&] { return to.full(); });
     for (auto* r : taken) {
+        r->report_times();
+        r->note_phase(job_times::phase::elsewhere);
         ++moved_;
         r->moved_ = to.take(r->requester_->node_call(), r->request().body(),
                             [this, r](bool refused) { end_move(*r, refused); });
@@ -313,6 +326,7 @@ void job_dispatcher::end_move(job_record& r, bool refused) {
         workers_.wake();
         return;
     }
+    ++figures_.moved;
     r.answered_ = true;
     forget_requester(r);
     release_record(r);
@@ -383,7 +397,8 @@ void job_dispatcher::log(job_ptr job, log_level level, std::string text) {
         if (r.requester_) {
             r.requester_->log(level, text); // adds the request's id
         } else {
-            write_log(level, {text, r.request().peer().address});
+            const auto& what = r.request();
+            write_log(level, {text, what.peer().address, 0, current_trace::id_in(what.trace())});
         }
     });
     if (!put) {
@@ -449,7 +464,7 @@ void job_dispatcher::report_stuck() {
                   {"worker " + std::to_string(worker.slot + 1) + " is stuck in " + std::string{to_string(what.verb())} +
                        " '" + std::string{what.task()} + "' for " + seconds(worker.busy_for) +
                        (worker.replaced ? ": replaced by another" : ": no replacement is left"),
-                   what.peer().address});
+                   what.peer().address, 0, current_trace::id_in(what.trace())});
     }
 }
 

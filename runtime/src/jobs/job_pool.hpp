@@ -57,9 +57,10 @@ struct pool_options {
 
 /// The counters of a pool of workers since its start, and its current state.
 struct pool_figures {
-    std::uint64_t admitted = 0;        ///< jobs that were queued
+    std::uint64_t admitted = 0;        ///< jobs that were queued: these are open, withdrawn, moved or answered
     std::uint64_t refused = 0;         ///< with `busy`: the queue was full, or the pool was draining
     std::uint64_t withdrawn = 0;       ///< removed from the queue before they started
+    std::uint64_t moved = 0;           ///< ended at another node
     std::uint64_t answered = 0;        ///< ended with a result, or a failure of their own
     std::uint64_t threw = 0;           ///< whose handler threw
     std::uint64_t answerless = 0;      ///< ended without an answer, because its last holder was destroyed
@@ -80,15 +81,15 @@ struct pool_figures {
     std::uint64_t service_time_us = 0; ///< how long a job holds a worker, smoothed
 };
 BOOST_DESCRIBE_STRUCT(pool_figures, (),
-                      (admitted, refused, withdrawn, answered, threw, answerless, answered_twice, logs_dropped, stuck,
-                       replaced, revived, inline_calls, inline_slow, inline_worst_us, queued, running, waiting, workers,
-                       stuck_now, service_time_us))
+                      (admitted, refused, withdrawn, moved, answered, threw, answerless, answered_twice, logs_dropped,
+                       stuck, replaced, revived, inline_calls, inline_slow, inline_worst_us, queued, running, waiting,
+                       workers, stuck_now, service_time_us))
 
 /// How a drain ended.
 struct drain_report {
     std::size_t refused = 0;   ///< jobs that had not started and were answered `busy`
-    std::size_t abandoned = 0; ///< jobs that had started and were answered `unavailable`
-    std::size_t stuck = 0;     ///< of these, those that still hold a worker
+    std::size_t abandoned = 0; ///< jobs that had started or moved to other nodes, and were answered `unavailable`
+    std::size_t stuck = 0;     ///< jobs that still hold a worker
 };
 
 /// Takes the jobs of a pool, on the service's executor, from admission to reply: it is the sequence of these steps, and

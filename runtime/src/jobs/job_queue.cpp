@@ -12,7 +12,7 @@ constexpr std::size_t max_idle = 64;
 } // namespace
 
 // The requester is served after all others, unless it has jobs already.
-job_queue::requester_queue& job_queue::queue_for(item& job) {
+job_queue::requesters::iterator job_queue::queue_for(item& job) {
     auto found = known_.find(job.requester);
     if (found == known_.end()) {
         if (spare_.empty()) {
@@ -24,11 +24,14 @@ job_queue::requester_queue& job_queue::queue_for(item& job) {
     }
     const auto own = found->second;
     if (own->jobs.empty()) {
+        own->turn = ++last_turn_;
         with_jobs_.splice(with_jobs_.end(), idle_, own);
     }
     job.queued_ = true;
     ++size_;
-    return *own;
+    movable_ += job.movable ? 1 : 0;
+    movable_queued_ += job.movable ? 1 : 0;
+    return own;
 }
 
 bool job_queue::push(item& job) {
@@ -36,22 +39,33 @@ bool job_queue::push(item& job) {
         return false;
     }
     job.order_ = ++last_order_;
-    queue_for(job).jobs.push_back(job);
+    queue_for(job)->jobs.push_back(job);
     return true;
 }
 
 void job_queue::put_back(item& job) {
-    auto& jobs = queue_for(job).jobs;
+    const auto own = queue_for(job);
+    auto& jobs = own->jobs;
     jobs.insert(std::find_if(jobs.begin(), jobs.end(), [&](const item& each) { return each.order_ > job.order_; }),
                 job);
+    if (job.turn_ < own->turn) {
+        own->turn = job.turn_;
+        const auto next = std::find_if(with_jobs_.begin(), with_jobs_.end(),
+                                       [&](const requester_queue& each) { return each.turn > own->turn; });
+        with_jobs_.splice(next, with_jobs_, own);
+    }
 }
 
-void job_queue::push_resumed(item& job) { queue_for(job).jobs.push_front(job); }
+void job_queue::push_resumed(item& job) {
+    job.movable = false;
+    queue_for(job)->jobs.push_front(job);
+}
 
 void job_queue::unlink(requesters::iterator from, item& job) noexcept {
     from->jobs.erase(from->jobs.iterator_to(job));
     job.queued_ = false;
     --size_;
+    movable_ -= job.movable ? 1 : 0;
     if (!from->jobs.empty()) {
         return;
     }
@@ -75,13 +89,16 @@ job_queue::item* job_queue::pop() noexcept {
     const auto next = with_jobs_.begin();
     auto& job = next->jobs.front();
     with_jobs_.splice(with_jobs_.end(), with_jobs_, next);
+    next->turn = ++last_turn_;
     unlink(next, job);
     return &job;
 }
 
 void job_queue::remove(item& job) noexcept {
     if (job.queued()) {
-        unlink(known_.find(job.requester)->second, job);
+        const auto own = known_.find(job.requester)->second;
+        job.turn_ = own->turn;
+        unlink(own, job);
     }
 }
 

@@ -31,6 +31,8 @@ class job_queue {
 
         /// Any number that identifies the requester. Not changed while this is queued.
         std::uint64_t requester = 0;
+        /// Whether it may move to another node. Not changed while this is queued.
+        bool movable = false;
         [[nodiscard]] bool queued() const noexcept { return queued_; }
 
       protected:
@@ -40,6 +42,7 @@ class job_queue {
         friend job_queue;
         bool queued_ = false;
         std::uint64_t order_ = 0; // of its first `push`
+        std::uint64_t turn_ = 0;  // that its requester had when it was removed
     };
 
     explicit job_queue(std::size_t capacity) : capacity_(capacity) {}
@@ -50,10 +53,10 @@ class job_queue {
     /// Queues a new job. False if the queue is full.
     [[nodiscard]] bool push(item& job);
     /// Queues a job that has started and continues: before the new jobs of its requester, and without a limit, because
-    /// it has been admitted, and others may wait for it.
+    /// it has been admitted, and others may wait for it. From now on it is not movable.
     void push_resumed(item& job);
-    /// Queues a job that has been removed but has not started, at its old place among the jobs of its requester, and
-    /// without a limit.
+    /// Queues a job that has been removed but has not started, at its old place: among the jobs of its requester, whose
+    /// turn comes no later than it did then. Without a limit.
     void put_back(item& job);
     /// Calls `see(job, ahead)` with the jobs in the order in which they will be popped, until it returns false. The
     /// queue must not be changed meanwhile.
@@ -66,23 +69,30 @@ class job_queue {
 
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
     [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+    /// How many of the jobs are movable, and how many such jobs have been queued so far.
+    [[nodiscard]] std::size_t movable() const noexcept { return movable_; }
+    [[nodiscard]] std::uint64_t movable_queued() const noexcept { return movable_queued_; }
 
   private:
     /// The waiting jobs of one requester.
     struct requester_queue {
         std::uint64_t requester = 0;
+        std::uint64_t turn = 0;
         boost::intrusive::list<item, boost::intrusive::constant_time_size<false>> jobs{};
     };
     using requesters = std::list<requester_queue>;
 
-    requester_queue& queue_for(item& job);
+    requesters::iterator queue_for(item& job);
     void unlink(requesters::iterator from, item& job) noexcept;
 
     std::size_t capacity_;
     std::size_t size_ = 0;
+    std::size_t movable_ = 0;
+    std::uint64_t movable_queued_ = 0;
     std::uint64_t last_order_ = 0;
+    std::uint64_t last_turn_ = 0;
     boost::unordered_flat_map<std::uint64_t, requesters::iterator> known_; // those in the next two
-    requesters with_jobs_;                                                 // the first is served next
+    requesters with_jobs_;                                                 // by turn: the first is served next
     requesters idle_;                                                      // without jobs
     requesters spare_;                                                     // their memory is reused
 };

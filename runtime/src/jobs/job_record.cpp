@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/job_record.hpp"
 
+#include "jobs/current_trace.hpp"
 #include "jobs/job_pool.hpp"
 
 #include <cmath>
@@ -40,6 +41,9 @@ void job_record::assign(const cles::request& what, std::shared_ptr<const identit
 }
 
 void job_record::clear() {
+    if (is_traced()) {
+        times_.reset();
+    }
     dispatcher_.reset();
     task_.reset();
     reports_.clear();
@@ -149,6 +153,9 @@ bool job_record::claim_answer() noexcept {
         dispatcher_->counts().answered_twice.fetch_add(1, std::memory_order_relaxed);
         return false;
     }
+    if (is_traced()) {
+        times_.freeze(time_point::clock::now());
+    }
     // A job that has answered is not told to stop any more. Its callback is destroyed here, on the job's thread, and
     // not on the executor.
     if (has_on_stop_.load(std::memory_order_acquire)) {
@@ -177,7 +184,16 @@ void job_record::answer(std::string_view text, std::optional<errc> failure,
     }
 }
 
-void job_record::send_answer() const {
+// On the executor.
+void job_record::report_times() {
+    if (is_traced() && requester_) {
+        const auto times = times_.take(time_point::clock::now());
+        requester_->record_times(times.queued, times.ran);
+    }
+}
+
+void job_record::send_answer() {
+    report_times();
     if (retry_) {
         requester_->refuse(result_, *retry_);
     } else if (failure_) {
@@ -272,12 +288,15 @@ boost::asio::any_io_executor job_record::executor() const { return dispatcher_->
 // An exception becomes text on this thread, because it belongs to the code that threw it.
 template <class F>
 void job_record::run_guarded(F&& work) noexcept {
+    const current_trace during{request_.trace()};
+    note_phase(job_times::phase::running);
     try {
         work();
     } catch (...) {
         dispatcher_->counts().threw.fetch_add(1, std::memory_order_relaxed);
         detail::fail_with(*this, std::current_exception());
     }
+    note_phase(job_times::phase::elsewhere);
 }
 
 bool job_record::start(time_point executor_due) noexcept {

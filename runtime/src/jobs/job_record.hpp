@@ -14,6 +14,7 @@
 
 #include "jobs/adaptive_mutex.hpp"
 #include "jobs/job_queue.hpp"
+#include "jobs/job_times.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/smart_ptr/intrusive_ptr.hpp>
@@ -84,6 +85,12 @@ class job_record final : public job_queue::item, public detail::call_control {
     /// The worker is done with the job: sends the written result, if any, and releases the job. Returns whether there
     /// was a result. \param may_defer sends it without waking the executor
     bool finish_run(bool may_defer) noexcept;
+    /// If it is traced, notes what it does from now on.
+    void note_phase(job_times::phase next) {
+        if (is_traced()) {
+            times_.begin(next, time_point::clock::now());
+        }
+    }
     /// Identifies the job's task.
     [[nodiscard]] const void* task() const noexcept { return task_.get(); }
 
@@ -121,13 +128,15 @@ class job_record final : public job_queue::item, public detail::call_control {
         std::string json;
     };
 
+    [[nodiscard]] bool is_traced() const noexcept { return !request_.trace().empty(); }
     template <class F>
     void run_guarded(F&& work) noexcept;
     [[nodiscard]] bool claim_answer() noexcept;
     void answer(std::string_view text, std::optional<errc> failure, std::optional<std::chrono::milliseconds> retry);
     std::function<void()> stop();
     void send_progress();
-    void send_answer() const;
+    void send_answer();
+    void report_times();
 
     // -- any thread ------------------------------------------------------------------------------------------------
     std::atomic<int> references_{0};
@@ -142,6 +151,7 @@ class job_record final : public job_queue::item, public detail::call_control {
     std::optional<errc> failure_;                    // then the result is its message
     std::optional<std::chrono::milliseconds> retry_; // of a refusal
     bool result_written_ = false;                    // used by the worker only
+    job_times times_;                                // of a traced job
     detail::owned_request owned_;
     cles::request request_{owned_.data()};
     std::shared_ptr<job_dispatcher> dispatcher_;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/pooled_registrar.hpp"
 
+#include "jobs/current_trace.hpp"
+
 #include <chrono>
 #include <memory>
 #include <string_view>
@@ -42,12 +44,14 @@ void pooled_registrar::time_inline(registration& task) {
     if (task.plain) {
         task.plain = [handler = std::move(task.plain), dispatcher = dispatcher_](const request& r, json_writer& w) {
             const inline_timer timed{*dispatcher, r.task()};
+            const current_trace during{r.trace()};
             handler(r, w);
         };
     }
     if (task.async) {
         task.async = [handler = std::move(task.async), dispatcher = dispatcher_](const request& r, responder answer) {
             const inline_timer timed{*dispatcher, r.task()};
+            const current_trace during{r.trace()};
             handler(r, std::move(answer));
         };
     }

@@ -46,6 +46,7 @@ job_record* worker_pool::pop() noexcept { return static_cast<job_record*>(queue_
 // With the lock. The job is the first of its requester.
 void worker_pool::resume(job_record& job) {
     job.state = job_record::run_state::queued;
+    job.note_phase(job_times::phase::queued);
     queue_.push_resumed(job);
 }
 
@@ -101,6 +102,7 @@ bool worker_pool::put_back(job_record& job) {
     }
     queue_.put_back(job);
     job.state = job_record::run_state::queued;
+    job.note_phase(job_times::phase::queued);
     return true;
 }
 
@@ -334,6 +336,8 @@ worker_pool::figures worker_pool::read_figures() const noexcept {
     auto result = counts_;
     result.stuck_now = static_cast<std::uint32_t>(watchdog_.stuck());
     result.queued = static_cast<std::uint32_t>(queue_.size());
+    result.movable = static_cast<std::uint32_t>(queue_.movable());
+    result.movable_queued = queue_.movable_queued();
     result.running = busy_;
     result.usable = static_cast<std::uint32_t>(watchdog_.usable());
     result.service_time = service_time_.value();

@@ -11,6 +11,7 @@
 #include "jobs/worker_threads.hpp"
 #include "jobs/worker_watchdog.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -58,10 +59,10 @@ class worker_pool {
     void wake();
     /// Removes a job that has not started. False if it has.
     bool withdraw(job_record& job);
-    /// Removes jobs that have not started: those that `wants(job, ahead)` returns true for, in the order in which they
-    /// would start, until `full()` does. \param most how many are looked at
-    template <class Wants, class Full>
-    [[nodiscard]] std::vector<job_record*> take(std::size_t most, Wants wants, Full full);
+    /// Removes movable jobs: those that `choose(job, ahead)` returns true for, in the order in which they would start,
+    /// until `full()` does. \param most how many are looked at, among 16 times as many jobs
+    template <class Choose, class Full>
+    [[nodiscard]] std::vector<job_record*> take(std::size_t most, Choose choose, Full full);
     /// Queues a job that `take` has removed, at its old place. False after `close`.
     [[nodiscard]] bool put_back(job_record& job);
     /// Has `on_free` called, on a worker, when the next worker becomes free. False if one is free already.
@@ -100,6 +101,8 @@ class worker_pool {
         std::uint64_t revived = 0;
         std::uint32_t stuck_now = 0;
         std::uint32_t queued = 0;
+        std::uint32_t movable = 0;        ///< of these
+        std::uint64_t movable_queued = 0; ///< since the start
         std::uint32_t running = 0;
         std::uint32_t usable = 0;                  ///< workers that are not stuck
         std::chrono::nanoseconds service_time{0};  ///< how long a job holds a worker; zero before the first job
@@ -138,16 +141,20 @@ class worker_pool {
     std::condition_variable_any idle_;
 };
 
-template <class Wants, class Full>
-std::vector<job_record*> worker_pool::take(std::size_t most, Wants wants, Full full) {
+template <class Choose, class Full>
+std::vector<job_record*> worker_pool::take(std::size_t most, Choose choose, Full full) {
     std::vector<job_record*> taken;
     const std::lock_guard lock{mutex_};
+    auto left = std::min(most, queue_.movable());
     queue_.visit([&](job_queue::item& each, std::size_t ahead) {
         auto& job = static_cast<job_record&>(each);
-        if (!job.started && wants(job, ahead)) {
-            taken.push_back(&job);
+        if (job.movable) {
+            --left;
+            if (choose(job, ahead)) {
+                taken.push_back(&job);
+            }
         }
-        return ahead + 1 < most && !full();
+        return left != 0 && ahead + 1 < 16 * most && !full();
     });
     for (auto* job : taken) {
         queue_.remove(*job);

@@ -331,7 +331,8 @@ void loaded_plugin::call_handler(task_handler handler, void* user, const request
                              .peer_name = abi_text(peer.name),
                              .peer_uid = peer.uid ? static_cast<std::int64_t>(*peer.uid) : -1,
                              .peer_local = peer.local ? 1 : 0,
-                             .reserved = 0};
+                             .reserved = 0,
+                             .trace = abi_text(what.trace())};
     const auto report_exception = [&](const std::string& how) {
         log(log_level::error, std::string{what.task()} + ": its handler threw " + how + " out of the plugin");
         jobs_.finish(job, [](const responder& to) { to.fail(errc::failed, "the handler failed"); });

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace cles::runtime {
@@ -12,25 +14,25 @@ namespace cles::runtime {
 /// configuration.
 class plugin_error : public std::runtime_error {
   public:
-    /// \param setting the key of the setting that is invalid, if one is; empty for all of them together
-    plugin_error(const std::string& path, const std::string& why, std::optional<std::string> setting = std::nullopt)
-        : std::runtime_error(path + ": " + why), setting_(std::move(setting)) {}
+    /// \param key the key that is to blame, in the plugin's entry of the configuration
+    plugin_error(const std::string& path, const std::string& why, std::string key = "path")
+        : std::runtime_error(path + ": " + why), path_size_(path.size()), key_(std::move(key)) {}
 
-    [[nodiscard]] const std::optional<std::string>& setting() const noexcept { return setting_; }
-    /// The key that is to blame, in the plugin's entry of the configuration.
-    [[nodiscard]] virtual std::string key() const {
-        return !setting_ ? "path" : setting_->empty() ? "config" : "config." + *setting_;
+    [[nodiscard]] const std::string& key() const noexcept { return key_; }
+    /// The same as `what()` without the path.
+    [[nodiscard]] std::string_view why() const noexcept {
+        constexpr std::string_view separator = ": ";
+        return std::string_view{what()}.substr(path_size_ + separator.size());
     }
 
   private:
-    std::optional<std::string> setting_;
+    std::size_t path_size_;
+    std::string key_;
 };
 
-/// The file does not have the configured SHA-256.
-class pin_error : public plugin_error {
-  public:
-    using plugin_error::plugin_error;
-    [[nodiscard]] std::string key() const override { return "sha256"; }
-};
+/// The key of a setting of the plugin itself, if one is to blame; empty for all of them together.
+inline std::string key_of_setting(const std::optional<std::string>& setting) {
+    return !setting ? "path" : setting->empty() ? "config" : "config." + *setting;
+}
 
 } // namespace cles::runtime

@@ -65,8 +65,10 @@ void require_pin(const std::string& path, const security::checked_file& file, co
         throw plugin_error(path, e.what());
     }
     if (found != sha256) {
-        throw pin_error(path, "the SHA-256 of " + file.path() + " is " + found +
-                                  ", not the configured one: if you know why the file has changed, set sha256 to this");
+        throw plugin_error(path,
+                           "the SHA-256 of " + file.path() + " is " + found +
+                               ", not the configured one: if you know why the file has changed, set sha256 to this",
+                           "sha256");
     }
 }
 
@@ -118,7 +120,7 @@ plugin_file::plugin_file(const std::string& path, std::filesystem::path file, co
                          const std::string& sha256)
     : path_(std::move(file)) {
     if (!sha256.empty()) {
-        throw pin_error(path, "this clesd was built without security, so it cannot check a SHA-256");
+        throw plugin_error(path, "this clesd was built without security, so it cannot check a SHA-256", "sha256");
     }
 }
 

@@ -77,7 +77,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
         return std::nullopt;
     };
     if (const auto refused = plugin.start(config, into.make_publisher(), owner_of)) {
-        throw plugin_error(path, refused->why, refused->setting);
+        throw plugin_error(path, refused->why, key_of_setting(refused->setting));
     }
     plugin_info info{.path = path, .name = plugin.name(), .version = plugin.version()};
     try {

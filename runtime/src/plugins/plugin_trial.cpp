@@ -4,6 +4,9 @@
 #include <cles/plugin_text.hpp>
 
 #include "config/config.hpp"
+#include "isolation/confinement.hpp"
+#include "isolation/descriptor.hpp"
+#include "isolation/plugin_process.hpp"
 #include "plugins/loaded_plugin.hpp"
 #include "plugins/plugin_library.hpp"
 
@@ -27,40 +30,25 @@
 #include <unistd.h>
 
 namespace cles::runtime {
+
+using namespace std::string_literals;
+
 namespace {
 
 // The child's exit codes. Unusual numbers, because a library that ends the process may use any, including 0.
 constexpr int usable = 123;
 constexpr int refused = 124;
-constexpr int refused_setting = 125;
 constexpr std::chrono::seconds trial_limit{10}; // for loading a plugin and its settings check
 constexpr std::size_t max_output = 2000;        // its last bytes, which say why it ended
 constexpr std::size_t max_read = 256 * 1024;
 // Small enough for the pipe to take a report at once, before it is read.
 constexpr std::size_t max_report = 2000;
 
-// The report of the child: a line for each step that has begun; then, if the plugin is refused, a null character and
-// the reason. The reason follows a line with the key of the invalid setting, if the exit code says so.
+// The report of the child: a line for each step that has begun; then, if the plugin is refused, a null character, a
+// line with the key that is to blame, and the reason.
 constexpr auto loading = "its initialization";
 constexpr auto describing = "its entry point";
 constexpr auto checking = "its settings check";
-
-class descriptor {
-  public:
-    explicit descriptor(int fd) noexcept : fd_(fd) {}
-    descriptor(const descriptor&) = delete;
-    descriptor& operator=(const descriptor&) = delete;
-    ~descriptor() { close(); }
-    [[nodiscard]] int get() const noexcept { return fd_; }
-    void close() noexcept {
-        if (fd_ >= 0) {
-            ::close(std::exchange(fd_, -1));
-        }
-    }
-
-  private:
-    int fd_;
-};
 
 void write_all(int to, std::string_view text) {
     [[maybe_unused]] const auto written = ::write(to, text.data(), std::min(text.size(), max_report));
@@ -86,7 +74,7 @@ void reset_process_state(pid_t parent, int output) {
 
 // In the child. Ends it without exit handlers, which belong to the parent.
 [[noreturn]] void run_child(pid_t parent, const plugin_file& file, const std::string& node, const std::string& config,
-                            const std::optional<confinement>& confined, int output, int report) {
+                            const std::optional<trial_confinement>& confined, int output, int report) {
     reset_process_state(parent, output);
     std::string step;
     const auto begin_step = [&](const char* next) {
@@ -96,7 +84,7 @@ void reset_process_state(pid_t parent, int output) {
     try {
         begin_step(loading);
         if (confined) {
-            confine(*confined, file.path());
+            confine(confined->limits, confined->threads, file.path(), true);
         }
         // Never unloaded, as in the daemon.
         const auto& library = *new auto{open_library("", file)};
@@ -107,15 +95,13 @@ void reset_process_state(pid_t parent, int output) {
         stop_notifier notifier;
         loaded_plugin plugin{detail::known_part(&described), node, jobs, notifier, {}};
         if (const auto why = plugin.check(config)) {
-            throw plugin_error("", why->why, why->setting);
+            throw plugin_error("", why->why, key_of_setting(why->setting));
         }
         ::_exit(usable);
     } catch (const plugin_error& e) {
-        const std::string why{std::string_view{e.what()}.substr(2)}; // without the path, which the parent adds
-        write_all(report, '\0' + (e.setting() ? *e.setting() + "\n" : "") + why);
-        ::_exit(e.setting() ? refused_setting : refused);
+        write_all(report, '\0' + e.key() + "\n" + std::string{e.why()});
     } catch (const std::exception& failed) {
-        write_all(report, '\0' + step + " threw: " + failed.what());
+        write_all(report, "\0path\n"s + step + " threw: " + failed.what());
     }
     ::_exit(refused);
 }
@@ -196,7 +182,7 @@ std::string single_line(std::string text) {
 bool wait_for_end(pid_t child, int from, std::string& output, std::chrono::steady_clock::time_point end, int& status) {
     bool ended = false;
     try {
-        const descriptor process{open_process(child)};
+        const owned_descriptor process{open_process(child)};
         ended = read_output(from, process.get(), output, end);
     } catch (...) {
         ::kill(child, SIGKILL);
@@ -221,37 +207,19 @@ std::string read_report(int from) {
     return {all.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
 }
 
-[[noreturn]] void refuse(const std::string& path, std::string_view why, bool blames_setting) {
+[[noreturn]] void refuse(const std::string& path, std::string_view why) {
+    const auto key = why.substr(0, why.find('\n'));
+    why.remove_prefix(std::min(key.size() + 1, why.size()));
     if (why.empty()) {
         throw plugin_error(path, "its trial failed without a message");
     }
-    std::optional<std::string> setting;
-    if (blames_setting) {
-        const auto end = std::min(why.find('\n'), why.size());
-        setting = single_line(std::string{why.substr(0, end)});
-        why.remove_prefix(std::min(end + 1, why.size()));
-    }
-    throw plugin_error(path, single_line(std::string{why}), setting);
-}
-
-struct pipe_ends {
-    descriptor from;
-    descriptor into;
-};
-
-pipe_ends make_pipe() {
-    std::array<int, 2> ends{};
-    // Only the reader's end is non-blocking, so that no output of the child is lost.
-    if (::pipe2(ends.data(), O_CLOEXEC) != 0 || ::fcntl(ends[0], F_SETFL, O_NONBLOCK) != 0) {
-        throw std::system_error(errno, std::generic_category(), "cannot create a pipe");
-    }
-    return {descriptor{ends[0]}, descriptor{ends[1]}};
+    throw plugin_error(path, single_line(std::string{why}), single_line(std::string{key}));
 }
 
 } // namespace
 
 void try_plugin(const std::string& path, const plugin_file& file, const std::string& node, const std::string& config,
-                std::chrono::milliseconds limit, const std::optional<confinement>& confined) {
+                std::chrono::milliseconds limit, const std::optional<trial_confinement>& confined) {
     const auto end = std::chrono::steady_clock::now() + limit;
     auto output_pipe = make_pipe();
     auto report_pipe = make_pipe();
@@ -279,24 +247,15 @@ void try_plugin(const std::string& path, const plugin_file& file, const std::str
         fail(" does not end");
     }
     if (WIFSIGNALED(status)) {
-        fail(" ends the process by signal " + std::to_string(WTERMSIG(status)));
+        fail(" ends the process by " + text_of_signal(WTERMSIG(status)));
     }
     const auto code = WEXITSTATUS(status);
-    if (code == refused || code == refused_setting) {
-        refuse(path, std::string_view{report}.substr(std::min(steps.size() + 1, report.size())),
-               code == refused_setting);
+    if (code == refused) {
+        refuse(path, std::string_view{report}.substr(std::min(steps.size() + 1, report.size())));
     }
     if (code != usable) {
         fail(" ends the process");
     }
-}
-
-confinement confinement_of(const isolation_limits& limits, std::size_t threads) {
-    return {.memory = limits.memory,
-            .open_files = limits.open_files,
-            .readable = limits.read,
-            .writable = limits.write,
-            .threads = threads};
 }
 
 std::string plugin_error_message(const config& setup, std::size_t plugin, const plugin_error& why) {
@@ -311,7 +270,7 @@ void try_plugins(config& setup) {
             const auto path = resolve_plugin_path(setup, wanted);
             const plugin_file file{path, find_plugin(path, rules.folders), rules, wanted.sha256};
             try_plugin(path, file, setup.node, wanted.config, trial_limit,
-                       wanted.isolated ? std::optional{confinement_of(wanted.limits, 0)} : std::nullopt);
+                       wanted.isolated ? std::optional{trial_confinement{wanted.limits, setup.lanes()}} : std::nullopt);
         } catch (const plugin_error& e) {
             wanted.trial_error = plugin_error_message(setup, i, e);
             if (wanted.required) {

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "config/config.hpp"
-#include "isolation/confinement.hpp"
+#include "isolation/isolation_limits.hpp"
 #include "plugins/plugin_error.hpp"
 #include "plugins/plugin_file.hpp"
 
@@ -12,6 +12,11 @@
 #include <string>
 
 namespace cles::runtime {
+
+struct trial_confinement {
+    isolation_limits limits;
+    std::size_t threads; ///< that the daemon starts in the process of the plugin
+};
 
 /// Loads a plugin in a child process, calls its entry point, and lets it check its settings. Its tasks are not
 /// registered.
@@ -26,10 +31,7 @@ namespace cles::runtime {
 /// \throws plugin_error if it cannot be used; std::system_error if it cannot be tried, for example because the process
 /// ignores SIGCHLD
 void try_plugin(const std::string& path, const plugin_file& file, const std::string& node, const std::string& config,
-                std::chrono::milliseconds limit, const std::optional<confinement>& confined = std::nullopt);
-
-/// What the process of an isolated plugin may use. \param threads that the daemon starts there
-confinement confinement_of(const isolation_limits& limits, std::size_t threads);
+                std::chrono::milliseconds limit, const std::optional<trial_confinement>& confined = std::nullopt);
 
 /// The message about a plugin that cannot be used: the location in the configuration, of the key that is to blame, and
 /// the reason.

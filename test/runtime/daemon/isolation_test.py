@@ -7,10 +7,13 @@ import hashlib
 import json
 import os
 import re
+import resource
 import signal
+import socket
 import unittest
 
-from daemon import DEFAULTS, HOSTILE, PLUGINS, STUBBORN, Daemon, Folder, body, clesd, wait_until_running
+from daemon import (DEFAULTS, HOSTILE, PLUGINS, STUBBORN, Daemon, Folder, body, clean_environment, clesd,
+                    wait_until_running)
 from support import PATIENCE, cles, wait_until
 
 # Sanitizers turn some ends into others, and need more memory than a limit allows.
@@ -18,8 +21,11 @@ SANITIZED = os.environ.get("SANITIZED", "") != ""
 
 
 EXITED = "ended itself with exit code "  # that of a sanitizer, if it cannot look for leaks by tracing the process
-LAST_WORDS = "it said last: " + ("" if SANITIZED else "about to crash")  # a sanitizer says more
+LAST_WORDS = "last output: '" + ("" if SANITIZED else "about to crash'")  # a sanitizer says more
 PATIENT = f"deadline={int(PATIENCE * 1000)}"
+# A job of the daemon that takes longer than the restart of a plugin.
+BELOW, PRIMES = ((2_000_000, {"count": 148933, "largest": 1999993}) if SANITIZED else
+                 (20_000_000, {"count": 1270607, "largest": 19999999}))
 
 
 def plugin(more="", limits="", path=HOSTILE, neighbour=f"{PLUGINS}/libcles-primes.so"):
@@ -49,7 +55,8 @@ class Isolated(unittest.TestCase):
     CONFIG = ""
 
     def setUp(self):
-        self.daemon = Daemon(plugin(self.CONFIG, self.LIMITS) + "stuck_after: 400ms\ndrain: 500ms\n" + self.MORE)
+        self.daemon = Daemon(plugin(self.CONFIG, self.LIMITS) + "stuck_after: 400ms\ndrain: 500ms\n" + self.MORE,
+                             env=clean_environment(TZ="Antarctica/Troll", SECRET="x"))
         self.addCleanup(self.daemon.__exit__)
 
     def tearDown(self):
@@ -77,13 +84,13 @@ class Ends(Isolated):
         with self.daemon.connect() as link:
             link.send(f"DELEGATE self:listens id=1 {PATIENT}")
             wait_until(lambda: self.figures()["jobs"] == 1, "it runs there")
-            link.send(f'DELEGATE self:primes id=2 {PATIENT} {{"below":20000000}}')
+            link.send(f'DELEGATE self:primes id=2 {PATIENT} {{"below":{BELOW}}}')
             link.send(f"{command} id=3")
             replies = {}
             while len(replies) < 3:
                 reply = link.read()
                 replies[reply.split()[0]] = body(reply)
-        self.assertEqual(replies["id=2"], {"count": 1270607, "largest": 19999999})
+        self.assertEqual(replies["id=2"], PRIMES)
         self.assertEqual(replies["id=1"]["error"], "failed")
         self.assertIn(words, replies["id=1"]["message"])
         self.assertIn("the plugin 'hostile'", replies["id=1"]["message"])
@@ -93,7 +100,7 @@ class Ends(Isolated):
         self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
         self.assertNotEqual(self.process(), before)
         wait_until(lambda: not exists(before), "the old process is gone")
-        entry = self.daemon.wait_for_entry("it is started again")
+        entry = self.daemon.wait_for_entry("Restarting.")
         self.assertEqual(entry["level"], "error")
         self.assertIn("hostile: its process ", entry["message"])
         self.assertIn(words, entry["message"])
@@ -123,6 +130,11 @@ class Ends(Isolated):
         metrics = json.loads(self.daemon.ask("PULL self:cles/metrics"))["pool"]
         self.assertEqual((metrics["stuck"], metrics["stuck_now"]), (0, 0))
 
+    def test_an_endless_loop_after_the_answer(self):
+        self.assertEqual(body(self.daemon.ask("DELEGATE self:answers_and_loops deadline=100")), {"value": 1})
+        self.daemon.wait_for_entry("DELEGATE 'answers_and_loops' did not end within 400 ms")
+        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+
     def test_an_endless_loop_that_is_cancelled(self):
         with self.daemon.connect() as link:
             link.send(f"DELEGATE self:loops id=1 {PATIENT}")
@@ -133,7 +145,72 @@ class Ends(Isolated):
         self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
 
     def test_it_closes_its_connections(self):
-        self.ends("DELEGATE self:closes_everything", "was ended by signal 9 (SIGKILL)")
+        self.ends("DELEGATE self:closes_everything", "was ended because it closed a connection")
+
+    def test_it_closes_its_control_connection(self):
+        self.ends("DELEGATE self:closes_control", "was ended because it closed a connection")
+
+    def test_it_closes_lanes_after_its_answer(self):
+        with self.daemon.connect() as link:
+            self.assertEqual(body(link.ask("DELEGATE self:closes_lanes")), {"value": 1})
+            link.ask("PUSH self:now")
+        self.daemon.wait_for_entry("its process was ended because it closed a connection. Restarting.")
+        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+
+    def test_it_drips(self):
+        """Bytes that arrive do not delay the end of a job that is overdue."""
+        self.ends("DELEGATE self:drips deadline=100",
+                  "was ended because DELEGATE 'drips' did not end within 400 ms of its deadline or cancellation",
+                  own=False, code="deadline")
+
+    def test_a_job_without_a_worker_does_not_end(self):
+        """Its handler has returned, and it is not answered."""
+        self.ends("DELEGATE self:keeps deadline=100",
+                  "was ended because DELEGATE 'keeps' did not end within 400 ms of its deadline or cancellation",
+                  own=False, code="deadline")
+
+    def test_overdue_jobs_withdraw_it(self):
+        for expected in ((1, "running"), (2, "running"), (3, "withdrawn")):
+            self.assertEqual(body(self.daemon.ask("DELEGATE self:keeps deadline=200"))["error"], "deadline")
+            wait_until(lambda: (self.figures()["ended"], self.figures()["state"]) == expected, f"it is {expected}")
+        self.assertEqual(body(self.daemon.ask("PULL self:quick"))["error"], "no_task")
+        self.daemon.wait_for_entry("third end within 60 s; the last: its process was ended because DELEGATE 'keeps'")
+
+    @unittest.skipIf(SANITIZED, "with a sanitizer, going on takes longer than the grace")
+    def test_a_job_that_waits_for_a_worker_is_not_overdue(self):
+        before = self.process()
+        with self.daemon.connect() as link, self.daemon.connect() as other:
+            link.send(f"DELEGATE self:passes_on/DELEGATE%20self%3Alistens id=1 {PATIENT}")
+            wait_until(lambda: self.stop_counts()[2] == 1, "it waits for the other job")
+            for i in (1, 2):
+                other.send(f'DELEGATE self:primes id={i} deadline=1500 {{"below":1000000000}}')
+            wait_until_running(self.daemon, 2)
+            link.send("PUSH self:cles/cancel/1 reply=no")
+            self.assertEqual(body(link.read())["error"], "cancelled")
+            for _ in range(2):
+                self.assertEqual(body(other.read())["error"], "deadline")
+            wait_until(lambda: self.figures()["jobs"] == 0, "it continues, and ends")
+        self.assertEqual(self.process(), before)
+
+    def test_signals_that_a_service_manager_sends_to_all_processes(self):
+        before = self.process()
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            os.kill(before, number)
+        self.assertEqual(self.process(), before)
+        self.assertEqual(self.figures()["ended"], 0)
+
+    def test_its_start_fails_for_a_while(self):
+        """Without descriptors, for example: that is not the plugin's fault."""
+        daemon = self.daemon.process.pid
+        usual = resource.prlimit(daemon, resource.RLIMIT_NOFILE)
+        before = self.process()
+        resource.prlimit(daemon, resource.RLIMIT_NOFILE, (3, usual[1]))
+        os.kill(before, signal.SIGKILL)
+        for delay in (100, 200, 400):
+            entry = self.daemon.wait_for_entry(f"Restarting in {delay} ms.")
+            self.assertIn("its process could not be started: ", entry["message"])
+        resource.prlimit(daemon, resource.RLIMIT_NOFILE, usual)
+        wait_until(lambda: self.daemon.ask("PULL self:quick") == '{"value":42}', "it is back")
 
     def test_it_says_nonsense(self):
         self.ends("DELEGATE self:says_nonsense", "was ended because what it said is invalid")
@@ -182,7 +259,8 @@ class Withdrawal(Isolated):
                    self.daemon.ask("BIND self:topic/7") == '{"value":7}', "it is published")
         for _ in range(3):
             self.crash()
-        self.daemon.wait_for_entry("for the third time within 60 s: its tasks are withdrawn until SIGHUP")
+        entry = self.daemon.wait_for_entry("Its tasks are withdrawn until SIGHUP.")
+        self.assertIn("third end within 60 s; the last: its process was ended by signal 6 (SIGABRT). ", entry["message"])
         self.assertEqual(body(self.daemon.ask("PULL self:quick"))["error"], "no_task")
         tasks = self.tasks()
         self.assertFalse({"aborts", "caller", "notice", "silent"} & tasks, tasks)
@@ -190,11 +268,45 @@ class Withdrawal(Isolated):
         figures = self.figures()
         self.assertEqual((figures["state"], figures["ended"], figures["process"]), ("withdrawn", 3, 0))
         self.daemon.send_signal(signal.SIGHUP)
-        self.daemon.wait_for_entry("its tasks were withdrawn; it is started again")
+        self.daemon.wait_for_entry("its tasks were withdrawn. Restarting on SIGHUP with the new configuration.")
         wait_until(lambda: self.daemon.ask("PULL self:quick") == '{"value":42}', "it is back")
         self.assertTrue({"aborts", "caller", "topic", "notice", "silent"} <= self.tasks())
         self.crash()  # the past is forgotten
         self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+
+    def withdraw(self):
+        for _ in range(3):
+            self.crash()
+        wait_until(lambda: self.figures()["state"] == "withdrawn", "they are withdrawn")
+
+    def reload(self, change):
+        with open(self.daemon.config, encoding="utf-8") as file:
+            text = file.read()
+        self.daemon.write(change(text))
+        self.daemon.send_signal(signal.SIGHUP)
+
+    def test_sighup_applies_new_limits_and_settings(self):
+        self.withdraw()
+        self.reload(lambda text: text.replace("isolation: process\n",
+                                              "isolation: process\n    limits: {open_files: 99}\n"
+                                              "    config: {padding: abc}\n"))
+        self.daemon.wait_for_entry("Restarting on SIGHUP with the new configuration.")
+        wait_until(lambda: self.daemon.ask("PULL self:padding") == '{"value":3}', "it is back")
+        self.daemon.wait_for_entry("no privileges, 99 open files")
+        self.assertFalse([e for e in self.daemon.entries() if "other changes" in e["message"]])
+
+    def test_sighup_with_an_invalid_configuration(self):
+        self.withdraw()
+        self.reload(lambda text: text + "nonsense: 1\n")
+        self.daemon.wait_for_entry("kept the old configuration")
+        self.daemon.wait_for_entry("Restarting on SIGHUP with the old configuration.")
+        wait_until(lambda: self.daemon.ask("PULL self:quick") == '{"value":42}', "it is back")
+
+    def test_all_that_it_has_published_is_retired(self):
+        self.assertEqual(self.daemon.ask(f"PUSH self:publish_many/6000 {PATIENT}"), "{}")
+        wait_until(lambda: self.daemon.ask("BIND self:topic/5999") == '{"value":5999}', "it is published")
+        self.withdraw()
+        self.assertEqual(self.daemon.ask("BIND self:topic/5999"), "{}")
 
     def test_other_nodes_are_told(self):
         base = DEFAULTS.replace("sat1", "sat2")
@@ -233,13 +345,42 @@ class Restart(unittest.TestCase):
                 self.assertEqual(d.ask("PULL self:quick"), '{"value":42}')
                 f.write("", "broken")
                 self.assertEqual(body(d.ask("DELEGATE self:aborts"))["error"], "failed")
-                d.wait_for_entry("while it was started again")
-                entry = d.wait_for_entry("its tasks are withdrawn")
+                entry = d.wait_for_entry("its process crashed again while starting: ")
+                if not SANITIZED:
+                    self.assertTrue(entry["message"].endswith(
+                        ": signal 11 (SIGSEGV); last output: 'about to crash'. Restarting."), entry)
+                entry = d.wait_for_entry("Its tasks are withdrawn")
                 self.assertIn(LAST_WORDS, entry["message"])
                 self.assertEqual(body(d.ask("PULL self:quick"))["error"], "no_task")
                 os.unlink(broken)
                 d.send_signal(signal.SIGHUP)
                 wait_until(lambda: d.ask("PULL self:quick") == '{"value":42}', "it is back")
+                self.assertEqual(d.stop()[0], 0)
+
+
+    def test_a_stop_during_a_restart(self):
+        with Folder() as f:
+            slow = f.file("slow")
+            with Daemon(plugin(f"slow_while: {slow}", f"read: [{f.path}]")) as d:
+                f.write("", "slow")
+                self.assertEqual(body(d.ask("DELEGATE self:aborts"))["error"], "failed")
+                d.wait_for_entry("Restarting.")
+                self.assertEqual(d.stop()[0], 0)
+
+    def test_a_path_that_is_missing_then(self):
+        """A device may be unplugged."""
+        with Folder() as f, Folder() as g:
+            with Daemon(plugin(limits=f"read: [{f.path}], write: [{g.path}]")) as d:
+                if "Landlock" not in d.wait_for_entry("confined to")["message"]:
+                    self.skipTest("this kernel has no Landlock")
+                os.rename(g.path, g.path + "-away")
+                try:
+                    self.assertEqual(body(d.ask("DELEGATE self:aborts"))["error"], "failed")
+                    entry = d.wait_for_entry("it cannot use a path of its 'limits.write': " + g.path)
+                    self.assertEqual(entry["level"], "warning")
+                    self.assertEqual(d.ask("PULL self:quick"), '{"value":42}')
+                finally:
+                    os.rename(g.path + "-away", g.path)
                 self.assertEqual(d.stop()[0], 0)
 
 
@@ -287,7 +428,25 @@ class Start(unittest.TestCase):
             self.refused(plugin(path=copy, neighbour=STUBBORN), "quick", check=False)
 
     def test_a_path_that_it_may_use_is_missing(self):
-        self.refused(plugin(limits="read: [/nowhere/at/all]"), "/nowhere/at/all: No such file or directory")
+        for key in ("read", "write"):
+            self.refused(plugin(limits=f"{key}: [/nowhere/at/all]"),
+                         f"plugins[1].limits.{key}: {HOSTILE}: /nowhere/at/all: No such file or directory")
+
+    def test_many_settings(self):
+        """More than a socket takes at once, at the start and at a restart."""
+        with Daemon(plugin(f"padding: {'x' * 300_000}")) as d:
+            self.assertEqual(d.ask("PULL self:padding"), '{"value":300000}')
+            self.assertEqual(body(d.ask("DELEGATE self:aborts"))["error"], "failed")
+            self.assertEqual(d.ask("PULL self:padding"), '{"value":300000}')
+            self.assertEqual(d.stop()[0], 0)
+
+    @unittest.skipIf(SANITIZED, "a sanitizer needs too much memory for a limit")
+    def test_many_workers_and_little_memory(self):
+        """The stacks of the daemon's threads do not count."""
+        base = DEFAULTS.replace("workers: 2", "workers: 60")
+        with Daemon(plugin(limits="memory: 64MiB"), base=base) as d:
+            self.assertEqual(d.ask("PULL self:quick"), '{"value":42}')
+            self.assertEqual(d.stop()[0], 0)
 
     def test_settings(self):
         for entry, words in (("isolation: thread", "'thread' is neither process nor none"),
@@ -312,9 +471,11 @@ class Start(unittest.TestCase):
             again = f.write(out, "again.yaml")
             self.assertEqual(clesd("--config", again, "--check")[0], 0)
 
-    def test_the_mode_is_not_for_people(self):
-        code, _, err = clesd("--plugin-process", "1", "x")
-        self.assertEqual((code, "the daemon itself starts this" in err), (2, True))
+    def test_the_mode_is_for_internal_use(self):
+        for arguments in ((), ("1", "x", "y"), ("0", "1", "y")):
+            with self.subTest(arguments):
+                self.assertEqual(clesd("--plugin-process", *arguments),
+                                 (2, "", "clesd: --plugin-process is for internal use; run clesd without it\n"))
 
 
 class End(Isolated):
@@ -325,6 +486,13 @@ class End(Isolated):
         self.assertLess(took, 4)
         self.assertFalse(exists(process))
         self.assertFalse([e for e in self.daemon.entries() if e["level"] == "error"])
+
+    def test_it_says_much_when_it_stops(self):
+        with Daemon(plugin("talk_at_stop: true")) as d:
+            self.assertEqual(d.ask("PULL self:last_words"), '{"value":true}')
+            self.assertEqual(d.stop()[0], 0)
+            self.assertNotIn("did not stop in time", d.log())
+            self.assertIn("hostile: last word 0", d.log())
 
     def test_it_ends_when_the_daemon_is_killed(self):
         process = self.process()
@@ -390,10 +558,62 @@ class Confinement(Isolated):
         if "a filter of system calls" not in self.in_force:
             self.skipTest("this kernel has no seccomp")
         daemon = self.daemon.process.pid
-        for task in ("signals", "traces"):
-            self.assertEqual(self.outcome(task, daemon), errno.EPERM, task)
+        for task in ("signals", "traces", "limits", "pins", "schedules", "renices", "sets_io_priority", "sets_owner",
+                     "sets_owner_by_ioctl"):
+            with self.subTest(task):
+                self.assertEqual(self.outcome(task, daemon), errno.EPERM)
+        for task in ("limits", "pins", "schedules", "renices", "sets_io_priority"):
+            for itself in (0, self.process()):
+                with self.subTest(task, itself=itself):
+                    self.assertEqual(self.outcome(task, itself), 0)
         self.assertEqual(self.outcome("signals", self.process()), 0)
         self.assertEqual(self.outcome("signals", -1), errno.EPERM)
+        self.assertEqual(self.outcome("renices_group", 0), errno.EPERM)
+        self.assertEqual(self.outcome("sets_signal", signal.SIGUSR1), errno.EPERM)
+        with open(f"/proc/{daemon}/limits", encoding="utf-8") as file:
+            self.assertNotRegex(file.read(), r"Max core file size +0 +0 ")
+
+    def test_it_stays_one_process_and_ends_with_the_daemon(self):
+        if "a filter of system calls" not in self.in_force:
+            self.skipTest("this kernel has no seccomp")
+        for task in ("forks", "clones", "begins_a_session", "changes_group", "makes_memory", "shares_memory",
+                     "outlives"):
+            with self.subTest(task):
+                self.assertEqual(self.outcome(task, 0), errno.EPERM)
+        self.assertEqual(self.outcome("clones_3", 0), errno.ENOSYS)
+        self.assertEqual(self.outcome("starts_a_thread", 0), 0)
+
+    def test_attributes_of_files(self):
+        if "a filter of system calls" not in self.in_force:
+            self.skipTest("this kernel has no seccomp")
+        for task in ("changes_mode", "changes_owner", "changes_time", "changes_attribute"):
+            with self.subTest(task):
+                self.assertEqual(self.outcome(task, 0), errno.EPERM)
+
+    def test_sockets(self):
+        if "a filter of system calls" not in self.in_force:
+            self.skipTest("this kernel has no seccomp")
+        self.assertEqual(self.outcome("opens_a_socket", int(socket.AF_UNIX)), errno.EPERM)
+        self.assertEqual(self.outcome("opens_a_socket", int(socket.AF_INET)), 0)
+        self.assertEqual(self.outcome("opens_a_pair", int(socket.SOCK_DGRAM)), errno.EPERM)
+        self.assertEqual(self.outcome("opens_a_pair", int(socket.SOCK_STREAM)), 0)
+
+    def test_its_environment(self):
+        for name, value in (("TZ", "Antarctica/Troll"), ("SECRET", "")):
+            self.assertEqual(self.outcome("variable", name), value, name)
+
+    def test_its_arguments(self):
+        with open(f"/proc/{self.process()}/cmdline", encoding="utf-8") as file:
+            self.assertEqual(file.read().split("\0")[4], "hostile.so")
+
+    def test_updates_of_other_tasks_are_dropped(self):
+        self.assertEqual(self.daemon.ask("PUSH self:publish_elsewhere"), "{}")
+        entry = self.daemon.wait_for_entry("an update of 'prime/1' was dropped: it is no task of the plugin")
+        self.assertEqual(entry["level"], "warning")
+
+    def test_log_entries_are_cut(self):
+        self.assertEqual(self.daemon.ask("PUSH self:logs_much"), "{}")
+        self.assertEqual(len(self.daemon.wait_for_entry("hostile: much ")["message"]), len("hostile: ") + 4096)
 
     def test_its_limits(self):
         with open(f"/proc/{self.process()}/limits", encoding="utf-8") as file:
@@ -401,7 +621,8 @@ class Confinement(Isolated):
         self.assertEqual(limits["Max core file size"], "0")
         self.assertLess(int(limits["Max open files"]), 100)
         if not SANITIZED:
-            self.assertEqual(limits["Max data size"], str(256 << 20))
+            stack = int(limits["Max stack size"]) if limits["Max stack size"].isdigit() else 2 << 20
+            self.assertEqual(limits["Max data size"], str((256 << 20) + 6 * stack))
         with open(f"/proc/{self.process()}/status", encoding="utf-8") as file:
             self.assertRegex(file.read(), "CapPrm:\t0+\nCapEff:\t0+\n(.*\n)*NoNewPrivs:\t1\n")
 
@@ -493,6 +714,12 @@ class Same(unittest.TestCase):
             with self.subTest(line):
                 self.both(lambda link, d: link.ask(line))
 
+    def test_its_traces(self):
+        trace = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-00"
+        for noun in ("caller", "passes_on/DELEGATE%20self%3Acaller"):
+            said = json.loads(self.both(lambda link, d, noun=noun: link.ask(f"DELEGATE self:{noun} trace={trace}")))
+            self.assertEqual(said["trace"], trace)
+
     def test_its_description(self):
         self.both(lambda link, d: json.loads(link.ask("PULL self:cles"))["tasks"])
 
@@ -522,6 +749,10 @@ class Same(unittest.TestCase):
             return [line for line in iter(link.read, 'id=7 {"value":"done"}')]
 
         self.assertEqual(self.both(talk), [f"id=7 progress={f} {{}}" for f in ("0.125", "0.25", "0.375", "0.5")])
+
+    def test_an_update_at_the_start(self):
+        for d in (self.here, self.there):
+            wait_until(lambda: d.ask("BIND self:topic/0") == '{"value":"first"}', "it is published")
 
     def test_updates(self):
         def talk(link, d):

@@ -19,6 +19,8 @@ BOOST_AUTO_TEST_CASE(json_omits_missing_members) {
     BOOST_TEST(format_json("sat1", "up") == R"("node":"sat1","message":"up")");
     BOOST_TEST(format_json("sat1", {"denied", "tcp://127.0.0.1:4242", 7}) ==
                R"("node":"sat1","peer":"tcp://127.0.0.1:4242","id":7,"message":"denied")");
+    BOOST_TEST(format_json("sat1", {"half way", "", 0, "4bf92f3577b34da6a3ce929d0e0e4736"}) ==
+               R"("node":"sat1","trace":"4bf92f3577b34da6a3ce929d0e0e4736","message":"half way")");
 }
 
 BOOST_AUTO_TEST_CASE(control_characters_are_escaped) {

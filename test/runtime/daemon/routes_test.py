@@ -4,11 +4,12 @@
 
 Line, star, ring and a grid: each daemon in a network namespace of its own, with a cable to each of its neighbours, and
 no IP forwarding. Except in the ring, `links` is not configured: nothing but the cables forbids other links. In another
-grid, all are on loopback, and nothing but `links` forbids other links."""
+grid and in a long line, all are on loopback, and nothing but `links` forbids other links."""
 
 import collections
 import contextlib
 import json
+import os
 import re
 import select
 import signal
@@ -19,7 +20,7 @@ import time
 import unittest
 
 from daemon import CLESD, PLUGINS, STUBBORN, Daemon, Folder, Link, body, clean_environment
-from support import PATIENCE, read_line, wait_until
+from support import CLES, PATIENCE, read_line, wait_until
 from two_hosts import Hosts, cannot_be_made
 
 PORT = 25370
@@ -178,22 +179,27 @@ class Updates:
 class Node(Daemon):
     """A daemon of a network; `wait` returns when it listens."""
 
-    def __init__(self, name, network, neighbours, has_links):
+    def __init__(self, name, network, neighbours, has_links, fleet=None):
         Folder.__init__(self)
         self.name = name
         self.local = isinstance(network, Loopback)
         self.port = network.ports[name] if self.local else PORT
         self.local_socket = self.file("socket")
+        scheme = "tls" if fleet else "tcp"
         listens = f"tcp://127.0.0.1:{self.port}"
         if not self.local:
-            listens = f"[tcp://0.0.0.0:{PORT}, unix://{self.local_socket}]"
-        seeds = ", ".join(network.url(neighbour, name) for neighbour in neighbours)
+            listens = f"[{scheme}://0.0.0.0:{PORT}, unix://{self.local_socket}]"
+        seeds = ", ".join(network.url(neighbour, name).replace("tcp", scheme) for neighbour in neighbours)
+        plugins = [STUBBORN, f"{PLUGINS}/libcles-primes.so", f"{PLUGINS}/libcles-system.so"]
+        own = f"node: {name}\ninsecure: true\n"
+        if fleet:
+            plugins = [os.path.join(fleet.plugins, os.path.basename(plugin)) for plugin in plugins]
+            own = f"security: {fleet.keys(name)}\nplugin_path: {fleet.plugins}\n"
         self.config = self.write(
-            f"node: {name}\nlisten: {listens}\ninsecure: true\nmulticast: off\nworkers: 2\n"
+            f"{own}listen: {listens}\nmulticast: off\nworkers: 2\n"
             f"log: {{level: debug, format: json}}\nseeds: [{seeds}]\n"
             + (f"links: [{', '.join(neighbours)}]\n" if has_links else "")
-            + f"plugins: [{STUBBORN}, {PLUGINS}/libcles-primes.so, "
-              f"{{path: {PLUGINS}/libcles-system.so, config: {{interval_ms: 50}}}}]\n")
+            + f"plugins: [{plugins[0]}, {plugins[1]}, {{path: {plugins[2]}, config: {{interval_ms: 50}}}}]\n")
         with open(self.file("log"), "w", encoding="utf-8") as log:
             self.process = subprocess.Popen([*network.prefix(name), CLESD, "--config", self.config],
                                             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=log, text=True,
@@ -272,8 +278,14 @@ class Network:
     HAS_LINKS = False
 
     @classmethod
+    def make_fleet(cls, _):
+        """Of a secured network."""
+        return None
+
+    @classmethod
     def setUpClass(cls):
         with contextlib.ExitStack() as opened:
+            cls.fleet = cls.make_fleet(opened)
             cls.network = cls.NETWORK(cls.NAMES, cls.CABLES)
             opened.callback(cls.network.close)
             cls.neighbours = {name: [(set(c) - {name}).pop() for c in cls.CABLES if name in c] for name in cls.NAMES}
@@ -281,7 +293,7 @@ class Network:
             cls.nodes = {}
             for name in cls.NAMES:
                 cls.nodes[name] = opened.enter_context(
-                    Node(name, cls.network, cls.neighbours[name], cls.HAS_LINKS))
+                    Node(name, cls.network, cls.neighbours[name], cls.HAS_LINKS, cls.fleet))
             for node in cls.nodes.values():
                 node.wait()
             cls.wait_for_routes(cls.CABLES, "after the start")
@@ -525,11 +537,21 @@ class Cuts(Network):
         self.wait_for_routes(self.CABLES, "mended", time.monotonic())
 
 
-class Ring(Topology, Cuts, unittest.TestCase):
+class RingTests(Topology, Cuts):
     NAMES = ["n1", "n2", "n3", "n4", "n5"]
     CABLES = [("n1", "n2"), ("n2", "n3"), ("n3", "n4"), ("n4", "n5"), ("n5", "n1")]
     NEAR, FAR = "n1", "n3"
     HAS_LINKS = True
+
+    def test_a_binding_avoids_the_nodes_that_have_forwarded_it(self):
+        before = {name: node.binds() for name, node in self.nodes.items()}
+        with self.near.connect() as link:
+            self.assertNotIn("error", body(link.ask("BIND n3:utc id=1 via=n2")))
+            self.assertTrue(link.read().startswith("UPDATE n3:utc "))
+            self.assertEqual({name: node.binds() - before[name] for name, node in self.nodes.items()},
+                             {"n1": 1, "n2": 0, "n3": 1, "n4": 1, "n5": 1})
+        wait_until(lambda: all(self.nodes[name].binds() == before[name] + 2 for name in ("n3", "n4", "n5")),
+                   "the bindings have ended")
 
     def test_a_binding_at_the_other_end_of_a_lost_link_moves_too(self):
         one, other = "n4", "n5"
@@ -555,6 +577,42 @@ class Ring(Topology, Cuts, unittest.TestCase):
 
     def test_a_cable_loses_everything(self):
         self.check_cut(("n3", "n4"), self.network.silence, self.network.end_silence, "silent")
+
+
+class Ring(RingTests, unittest.TestCase):
+    pass
+
+
+class LongLine(Network, unittest.TestCase):
+    """Longer than requests go unless they state `hops`."""
+
+    NAMES = [f"n{number:02}" for number in range(1, 13)]
+    CABLES = list(zip(NAMES, NAMES[1:]))
+    NEAR, FAR = "n01", "n12"
+    NETWORK = Loopback
+    HAS_LINKS = True
+
+    def test_a_request_goes_as_far_as_its_hops_and_says_how_to_go_further(self):
+        def ask(request):
+            with self.near.connect() as link:
+                return body(link.ask(f"{request} id=1"))
+
+        for verb, noun in (("PULL", "quick"), ("BIND", "utc")):
+            self.assertNotIn("error", ask(f"{verb} n09:{noun}"))
+            self.assertEqual(ask(f"{verb} {self.FAR}:{noun}"), {
+                "error": "no_target", "message": "n09: the request for 'n12' has been forwarded 8 times, and hops=8 "
+                                                 "permits no more: state hops=11 (at most 16)"})
+            self.assertEqual(ask(f"{verb} {self.FAR}:{noun} hops=10").get("error"), "no_target")
+            self.assertNotIn("error", ask(f"{verb} {self.FAR}:{noun} hops=11"))
+
+    @unittest.skipUnless(CLES, "the command is not built")
+    def test_the_command_states_hops(self):
+        ask = [CLES, "pull", f"{self.FAR}:quick", "--at", f"tcp://127.0.0.1:{self.near.port}", "-o", "raw"]
+        done = subprocess.run(ask, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("state hops=11", done.stderr)
+        done = subprocess.run([*ask, "--hops", "11"], capture_output=True, text=True, timeout=PATIENCE, check=True)
+        self.assertEqual(json.loads(done.stdout), {"value": 42})
 
 
 class CableGrid(Cuts, unittest.TestCase):

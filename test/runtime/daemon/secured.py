@@ -36,6 +36,16 @@ class Fleet(Folder):
     def keys(self, name):
         return os.path.join(self.authority, name)
 
+    def let_forward(self, *names, who="*"):
+        """They may forward for these members; `spread` follows."""
+        for name in names:
+            self.run("fleet", "rights", name, "--forwards", who, "--keys", self.authority)
+
+    def spread(self, *names):
+        """Gives the newest roster to nodes, as an operator does."""
+        for name in names:
+            self.run("keys", "join", os.path.join(self.authority, "roster"), "--keys", self.keys(name))
+
     def rule(self, name, text):
         """Replaces the local rules of a node."""
         path = os.path.join(self.keys(name), "rules")

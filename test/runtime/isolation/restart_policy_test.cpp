@@ -24,7 +24,6 @@ BOOST_AUTO_TEST_CASE(the_third_end_within_a_minute_withdraws) {
     BOOST_TEST(!p.withdrawn());
     BOOST_TEST((p.ended(at(59'999ms)) == decision::withdraw));
     BOOST_TEST(p.withdrawn());
-    BOOST_TEST(p.count() == 3);
 }
 
 BOOST_AUTO_TEST_CASE(ends_that_are_further_apart_do_not) {
@@ -55,7 +54,20 @@ BOOST_AUTO_TEST_CASE(once_withdrawn_it_stays_so_until_it_is_reset) {
     BOOST_TEST((p.ended(at(3h)) == decision::restart)); // earlier ends are forgotten
     BOOST_TEST((p.ended(at(3h)) == decision::restart));
     BOOST_TEST((p.ended(at(3h)) == decision::withdraw));
-    BOOST_TEST(p.count() == 7);
+}
+
+BOOST_AUTO_TEST_CASE(delays_double_up_to_a_limit_and_do_not_withdraw) {
+    policy p;
+    for (const auto expected : {100ms, 200ms, 400ms, 800ms, 1600ms, 3200ms, 5000ms, 5000ms}) {
+        BOOST_TEST((p.delay(at(0s)) == expected));
+    }
+    for (int i = 0; i < 100; ++i) {
+        BOOST_TEST((p.delay(at(1s)) == 5000ms));
+    }
+    BOOST_TEST(!p.withdrawn());
+    BOOST_TEST((p.delay(at(60'999ms)) == 5000ms));
+    BOOST_TEST((p.delay(at(121s)) == 100ms)); // a minute later, the past is forgotten
+    BOOST_TEST((p.ended(at(122s)) == decision::restart));
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -102,7 +102,7 @@ BOOST_FIXTURE_TEST_CASE(an_exception_from_a_callback_is_the_answer, fixture) {
         });
     });
     BOOST_TEST(left.peer().ask("DELEGATE self:asking") ==
-               R"({"error":"no_task","message":"car1: right has no PULL 'nothing'"})");
+               R"({"error":"no_task","message":"car1: right has no PULL 'nothing'","ran":true})");
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_whose_callback_does_not_answer_fails, fixture) {

@@ -86,6 +86,46 @@ BOOST_FIXTURE_TEST_CASE(a_job_that_is_put_back_has_its_old_place, fixture) {
     BOOST_TEST(pop_all() == "a1 a4 a5");
 }
 
+BOOST_FIXTURE_TEST_CASE(the_only_job_of_a_requester_that_is_put_back_has_its_old_place, fixture) {
+    for (std::uint64_t who = 0; who < 5; ++who) {
+        push(std::string{"abcde"[who]} + "1", who);
+    }
+    push("b2", 1);
+    for (const std::size_t moved : {0U, 2U, 3U}) {
+        queue.remove(made[moved]);
+    }
+    BOOST_TEST(pop() == "b1");
+    push("f1", 6);
+    push("c2", 2); // its requester has another place meanwhile
+    for (const std::size_t moved : {3U, 2U, 0U}) {
+        queue.put_back(made[moved]);
+    }
+    BOOST_TEST(pop_all() == "a1 c1 d1 e1 b2 f1 c2");
+}
+
+BOOST_FIXTURE_TEST_CASE(movable_jobs_are_counted, fixture) {
+    const auto add = [&](const std::string& name) -> named& {
+        auto& job = make(name, 1);
+        job.movable = true;
+        BOOST_TEST(queue.push(job));
+        return job;
+    };
+    auto& first = add("a1");
+    auto& second = add("a2");
+    push("a3", 1);
+    BOOST_TEST(queue.movable() == 2U);
+    queue.remove(second);
+    BOOST_TEST(queue.movable() == 1U);
+    queue.put_back(second);
+    BOOST_TEST(queue.movable() == 2U);
+    BOOST_TEST(queue.movable_queued() == 3U);
+    BOOST_TEST(pop() == "a1");
+    queue.push_resumed(first); // it has started
+    BOOST_TEST(queue.movable() == 1U);
+    BOOST_TEST(pop_all() == "a1 a2 a3");
+    BOOST_TEST(queue.movable() == 0U);
+}
+
 BOOST_FIXTURE_TEST_CASE(a_job_is_put_back_behind_one_that_has_started, fixture) {
     push("a1", 1);
     push("a2", 1);

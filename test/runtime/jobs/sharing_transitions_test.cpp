@@ -44,6 +44,7 @@ class other_node final : public cles::job_sharing, private cles::job_taker {
     [[nodiscard]] bool has_job() const noexcept { return ended_ != nullptr; }
     [[nodiscard]] bool was_withdrawn() const noexcept { return withdrawn_; }
 
+    [[nodiscard]] bool may_move(const cles::core::call&) const noexcept override { return true; }
     void on_change() override {}
     void withdraw(std::uint64_t) override {
         ended_ = nullptr;
@@ -52,7 +53,7 @@ class other_node final : public cles::job_sharing, private cles::job_taker {
 
   private:
     [[nodiscard]] bool full() const noexcept override { return left_ == 0; }
-    [[nodiscard]] bool wants(const cles::core::call&, std::size_t) override { return left_-- > 0; }
+    [[nodiscard]] bool choose(const cles::core::call&, std::size_t) override { return left_-- > 0; }
     std::uint64_t take(std::shared_ptr<cles::core::call> job, std::string_view,
                        std::function<void(bool refused)> ended) override {
         job_ = std::move(job);
@@ -198,6 +199,7 @@ const std::map<std::string, std::function<void(const std::string& what)>> transi
          holder h;
          h.other->grant();
          h.other->end(false);
+         SHOW(h.pool->figures().moved == 1U);
          h.hold.open();
          h.wait_for([&] { return h.pool->load().running == 0; });
          SHOW(h.begun->size() == 0U);
@@ -221,6 +223,9 @@ const std::map<std::string, std::function<void(const std::string& what)>> transi
          h.run();
          h.second->open();
          SHOW(h.reply() == "id=2 {}");
+         h.wait_for([&] { return h.pool->figures().answered == 2; });
+         SHOW(h.pool->figures().admitted == 2U);
+         SHOW(h.pool->figures().moved == 0U);
      }},
     {"holder.moved withdrawn holder.done",
      [](const std::string& what) {

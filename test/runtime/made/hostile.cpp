@@ -18,11 +18,22 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
+#include <sched.h>
+#include <sys/ioctl.h>
+#include <sys/ipc.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/ptrace.h>
+#include <sys/resource.h>
+#include <sys/shm.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 namespace {
@@ -32,8 +43,13 @@ using namespace std::chrono_literals;
 struct settings {
     std::optional<bool> crash_at_start;
     std::optional<std::string> crash_while; ///< this file exists
+    /// While this file exists, a start takes until the daemon says something, which is then that the plugin has to
+    /// stop.
+    std::optional<std::string> slow_while;
+    std::optional<bool> talk_at_stop; ///< more than a pipe holds
+    std::optional<std::string> padding;
 };
-BOOST_DESCRIBE_STRUCT(settings, (), (crash_at_start, crash_while))
+BOOST_DESCRIBE_STRUCT(settings, (), (crash_at_start, crash_while, slow_while, talk_at_stop, padding))
 
 struct caller {
     std::string node, transport, name;
@@ -41,8 +57,9 @@ struct caller {
     std::vector<std::string> parameters;
     std::string body;
     bool has_deadline = false;
+    std::string trace;
 };
-BOOST_DESCRIBE_STRUCT(caller, (), (node, transport, name, has_address, local, parameters, body, has_deadline))
+BOOST_DESCRIBE_STRUCT(caller, (), (node, transport, name, has_address, local, parameters, body, has_deadline, trace))
 
 struct point {
     double x = 0, y = 0;
@@ -58,13 +75,18 @@ caller describe(const cles::request& asked) {
             .local = asked.peer().local,
             .parameters = {asked.parameters().begin(), asked.parameters().end()},
             .body = std::string{asked.body()},
-            .has_deadline = left > 0s && left < 60s};
+            .has_deadline = left > 0s && left < 60s,
+            .trace = std::string{asked.trace()}};
 }
 
 void crash() {
     volatile int* nowhere = nullptr;
     *nowhere = 1; // NOLINT: this is what it is for
 }
+
+bool exists(const std::optional<std::string>& file) { return file && ::access(file->c_str(), F_OK) == 0; }
+
+constexpr int control = 3; // the first lane is the next one
 
 void until_stopped(const cles::responder& answer) {
     while (!answer.stopped()) {
@@ -86,6 +108,12 @@ void register_ends(cles::registrar& to) {
         for (std::atomic<bool> forever{true}; forever;) {
         }
     });
+    to.on_delegate("answers_and_loops", [](const cles::request&, const cles::responder& answer) {
+        answer.progress(0.5);
+        answer.done(1);
+        for (std::atomic<bool> forever{true}; forever;) {
+        }
+    });
     to.on_delegate("closes_everything", [] {
         for (int fd = 3; fd < 64; ++fd) {
             ::close(fd);
@@ -96,6 +124,38 @@ void register_ends(cles::registrar& to) {
         const std::string line = "id=99999999999999999999 nonsense\n";
         (void)::send(3, line.data(), line.size(), 0);
         std::this_thread::sleep_for(1h);
+    });
+    // Answers on the control connection, and then closes the lanes when it is told to.
+    const auto told = std::make_shared<std::atomic<bool>>(false);
+    to.on_delegate("closes_lanes", [told](const cles::request&, const cles::responder& answer) {
+        answer.progress(0.5);
+        answer.done(1);
+        told->wait(false);
+        for (int fd = control + 1; fd < 64; ++fd) {
+            ::shutdown(fd, SHUT_RDWR);
+        }
+        std::this_thread::sleep_for(1h);
+    });
+    to.on_push("now", [told] {
+        *told = true;
+        told->notify_all();
+    });
+    to.on_delegate("closes_control", [] {
+        ::shutdown(control, SHUT_WR);
+        std::this_thread::sleep_for(1h);
+    });
+    to.on_delegate("drips", [] {
+        for (;;) {
+            for (int fd = control + 1; fd < 64; ++fd) {
+                (void)::send(fd, "x", 1, MSG_DONTWAIT | MSG_NOSIGNAL);
+            }
+            std::this_thread::sleep_for(5ms);
+        }
+    });
+    // Its handler returns, and nothing answers.
+    to.on_delegate("keeps", [](const cles::request&, const cles::responder& answer) {
+        static std::vector<cles::responder> kept;
+        kept.push_back(answer);
     });
     to.on_delegate("exhausts_memory", [] {
         std::vector<std::unique_ptr<char[]>> all;
@@ -109,6 +169,68 @@ void register_ends(cles::registrar& to) {
 // -- what it must not do -------------------------------------------------------------------------------------------
 
 int outcome(long result) { return result < 0 ? errno : 0; }
+
+// Numbers of signals, limits and such are arguments; the files are its own.
+void register_calls(cles::registrar& to) {
+    const auto on = [&to](const char* name, auto call) {
+        to.on_pull(name, [call](const cles::request& asked) { return outcome(call(asked.parameter<int>(0))); });
+    };
+    on("limits", [](int process) { return ::prlimit(process, RLIMIT_CORE, nullptr, nullptr); });
+    on("pins", [](int process) {
+        cpu_set_t all;
+        CPU_ZERO(&all);
+        ::sched_getaffinity(0, sizeof all, &all);
+        return ::sched_setaffinity(process, sizeof all, &all);
+    });
+    on("schedules", [](int process) {
+        const sched_param usual{};
+        return ::sched_setscheduler(process, SCHED_OTHER, &usual);
+    });
+    on("renices", [](int process) { return ::setpriority(PRIO_PROCESS, static_cast<id_t>(process), 19); });
+    on("renices_group", [](int group) { return ::setpriority(PRIO_PGRP, static_cast<id_t>(group), 19); });
+    on("sets_io_priority", [](int process) { return ::syscall(SYS_ioprio_set, 1, process, 0); });
+    on("sets_owner", [](int process) { return ::fcntl(control, F_SETOWN, process); });
+    on("sets_owner_by_ioctl", [](int process) { return ::ioctl(control, FIOSETOWN, &process); });
+    on("sets_signal", [](int number) { return ::fcntl(control, F_SETSIG, number); });
+    on("forks", [](int) {
+        const auto child = ::fork();
+        if (child == 0) {
+            ::_exit(0);
+        }
+        return child;
+    });
+    on("clones", [](int) { return ::syscall(SYS_clone, CLONE_NEWUSER | SIGCHLD, 0, 0, 0, 0); });
+    on("clones_3", [](int) { return ::syscall(SYS_clone3, nullptr, 0); });
+    on("starts_a_thread", [](int) {
+        std::thread{[] {}}.join();
+        return 0;
+    });
+    on("begins_a_session", [](int) { return ::setsid(); });
+    on("changes_group", [](int group) { return ::setpgid(0, group); });
+    on("makes_memory", [](int) { return ::memfd_create("x", 0); });
+    on("shares_memory", [](int) { return ::shmget(IPC_PRIVATE, 4096, IPC_CREAT | 0600); });
+    on("outlives", [](int) { return ::prctl(PR_SET_PDEATHSIG, 0); });
+    on("changes_mode", [](int) { return ::chmod("/proc/self/exe", 0700); });
+    on("changes_owner", [](int user) { return ::chown("/proc/self/exe", static_cast<uid_t>(user), 0); });
+    on("changes_time", [](int) { return ::utimensat(AT_FDCWD, "/dev/null", nullptr, 0); });
+    on("changes_attribute", [](int) { return ::setxattr("/dev/null", "user.x", "x", 1, 0); });
+    on("opens_a_socket", [](int family) {
+        const int fd = ::socket(family, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+        if (fd >= 0) {
+            ::close(fd);
+        }
+        return fd;
+    });
+    on("opens_a_pair", [](int type) {
+        int fds[2];
+        const int failed = ::socketpair(AF_UNIX, type | SOCK_CLOEXEC, 0, fds);
+        if (failed == 0) {
+            ::close(fds[0]);
+            ::close(fds[1]);
+        }
+        return failed;
+    });
+}
 
 void register_attempts(cles::registrar& to) {
     to.on_pull("process", [] { return static_cast<int>(::getpid()); });
@@ -127,6 +249,16 @@ void register_attempts(cles::registrar& to) {
         const int failed = outcome(fd);
         ::close(fd);
         return failed;
+    });
+    register_calls(to);
+    to.on_pull("variable", [](const cles::request& asked) {
+        const char* value = std::getenv(std::string{asked.parameter(0)}.c_str());
+        return std::string{value == nullptr ? "" : value};
+    });
+    // Not by the plugin's host, which would cut it.
+    to.on_push("logs_much", [] {
+        const auto line = R"(PUSH self:cles/log {"level":1,"text":"much )" + std::string(100'000, 'x') + "\"}\n";
+        (void)::send(control, line.data(), line.size(), 0);
     });
     // Which descriptors it has, besides those of its output.
     to.on_pull("descriptors", [] {
@@ -240,8 +372,15 @@ void register_jobs(cles::registrar& to) {
 
 void register_updates(cles::registrar& to) {
     const auto updates = std::make_shared<cles::publisher>(to.make_publisher());
+    updates->update("topic/0", "first");
     to.on_push("publish", [updates](const cles::request& asked) {
         updates->update("topic/" + std::string{asked.parameter(0)}, asked.parameter<int>(0));
+    });
+    to.on_push("publish_elsewhere", [updates] { updates->update("prime/1", 1); });
+    to.on_push("publish_many", [updates](const cles::request& asked) {
+        for (int i = 0; i < asked.parameter<int>(0); ++i) {
+            updates->update("topic/" + std::to_string(i), i);
+        }
     });
     to.on_bind("topic", [](const cles::request& asked) {
         if (asked.parameters().empty()) {
@@ -256,11 +395,34 @@ void register_updates(cles::registrar& to) {
     to.on_bind("silent");
 }
 
+// Said when the plugin stops.
+struct last_words {
+    explicit last_words(bool are_wanted) : wanted(are_wanted) {}
+    last_words(last_words&& other) noexcept : wanted(std::exchange(other.wanted, false)) {}
+    last_words(const last_words&) = default;
+    last_words& operator=(const last_words&) = delete;
+    ~last_words() {
+        if (wanted) {
+            for (int i = 0; i < 20'000; ++i) {
+                std::printf("last word %d\n", i);
+            }
+            std::fflush(stdout);
+        }
+    }
+    bool wanted;
+};
+
 void register_tasks(cles::registrar& to, const settings& how) {
-    if (how.crash_at_start.value_or(false) || (how.crash_while && ::access(how.crash_while->c_str(), F_OK) == 0)) {
+    if (how.crash_at_start.value_or(false) || exists(how.crash_while)) {
         std::fputs("about to crash\n", stderr);
         crash();
     }
+    if (exists(how.slow_while)) {
+        char first = 0;
+        (void)::recv(control, &first, 1, MSG_PEEK);
+    }
+    to.on_pull("padding", [size = how.padding.value_or("").size()] { return size; });
+    to.on_pull("last_words", [words = last_words{how.talk_at_stop.value_or(false)}] { return words.wanted; });
     register_ends(to);
     register_attempts(to);
     register_replies(to);

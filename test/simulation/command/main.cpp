@@ -277,6 +277,8 @@ int main(int argc, char** argv) {
     mesh->add_option("--crashes", sparse.setup.crashes, "Nodes that crash")->capture_default_str();
     mesh->add_option("--requests", sparse.setup.requests, "After each change")->capture_default_str();
     mesh->add_flag("!--undeclared", sparse.setup.declared, "The nodes have to find out which links there are");
+    mesh->add_option("--hops", sparse.setup.hops, "How many nodes may forward a request")->capture_default_str();
+    mesh->add_flag("--secured", sparse.setup.secured, "The nodes are members of a fleet");
     mesh->add_option("--seed", sparse.seed, "The first")->capture_default_str();
     mesh->add_option("--seeds", sparse.seeds, "How many")->capture_default_str();
     sharing_options shared;

@@ -14,9 +14,9 @@ namespace cles::simulation {
 namespace {
 
 std::string_view name_of(core::membership::change what) noexcept {
-    constexpr std::array<std::string_view, 8> names{"finds",        "finds elsewhere", "hears nothing of",
+    constexpr std::array<std::string_view, 9> names{"finds",        "finds elsewhere", "hears nothing of",
                                                     "hears again",  "sees leaving",    "gives up",
-                                                    "hears two of", "gives way to"};
+                                                    "hears two of", "gives way to",    "sees other links of"};
     return names[static_cast<std::size_t>(what)];
 }
 
@@ -117,6 +117,7 @@ std::uint64_t node_run::ask(unsigned to, carrier by, const request_order& what, 
                         call_options{}
                             .deadline(what.deadline)
                             .at(address_for(to, by))
+                            .hops(what.hops)
                             .urgent(by == carrier::urgent)
                             .on_progress(std::move(progress)),
                         std::move(operation));

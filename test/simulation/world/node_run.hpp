@@ -35,6 +35,7 @@ struct request_order {
     std::string_view noun;
     std::string_view body{};
     std::chrono::milliseconds deadline{0};
+    std::uint32_t hops = 8;
 };
 
 /// One incarnation of a node, from its start to its end or crash: the library's node in an environment of virtual time.

@@ -39,6 +39,7 @@ void work_pool::submit(order what) {
     auto& j = *jobs_.emplace(number, std::make_unique<job>()).first->second;
     j.number = number;
     j.requester = what.requester;
+    j.movable = sharing_ && sharing_->may_move(*what.answer);
     if (!queue_.push(j)) {
         jobs_.erase(number);
         refuse(runtime::retry_delay(queue_.size(), watch_.usable(), service_time_.value()));
@@ -162,16 +163,19 @@ shareable_queue::state work_pool::read_state() const {
     const auto usable = watch_.usable();
     const auto busy = host_.fault() == planted::slots_overstated ? 0 : std::min(at_work_, usable);
     return {.waiting = static_cast<std::uint32_t>(queue_.size()),
-            .idle = static_cast<std::uint32_t>(draining_ ? 0 : usable - busy),
+            .idle = static_cast<std::uint32_t>(usable - busy),
             .workers = static_cast<std::uint32_t>(usable),
-            .service_time = std::chrono::ceil<std::chrono::microseconds>(service_time_.value())};
+            .service_time = std::chrono::ceil<std::chrono::microseconds>(service_time_.value()),
+            .movable = static_cast<std::uint32_t>(queue_.movable()),
+            .movable_queued = queue_.movable_queued(),
+            .draining = draining_};
 }
 
 void work_pool::offer(job_taker& to) {
     std::vector<job*> taken;
     queue_.visit([&](runtime::job_queue::item& each, std::size_t ahead) {
         auto& j = static_cast<job&>(each);
-        if (to.wants(*j.what.answer, ahead)) {
+        if (j.movable && to.choose(*j.what.answer, ahead)) {
             taken.push_back(&j);
         }
         return !to.full();

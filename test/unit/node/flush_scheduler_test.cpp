@@ -29,6 +29,7 @@ struct link final : core::flushable, core::subscriber, std::enable_shared_from_t
         return takes_all;
     }
     bool has_single_request() override { return alone; }
+    bool has_single_message() override { return alone; }
     std::shared_ptr<core::flushable> share() override { return shared_from_this(); }
     [[nodiscard]] bool takes_updates() const override { return true; }
     void put_updates(std::string_view lines) override {
@@ -163,6 +164,53 @@ BOOST_AUTO_TEST_CASE(others_may_ask_for_a_flush_while_one_is_written) {
         one->done.clear();
         two->done.clear();
     }
+}
+
+BOOST_AUTO_TEST_CASE(a_message_that_is_forwarded_alone_is_written_after_its_line_without_a_turn) {
+    one->alone = true;
+    node.flush_scheduler.run_line([&] { node.flush_scheduler.flush_soon(*one); }, [] { return true; });
+    BOOST_TEST(one->done == calls{"write"}, boost::test_tools::per_element());
+    BOOST_TEST(node.posted == 0);
+}
+
+BOOST_AUTO_TEST_CASE(other_messages_wait_for_the_turn) {
+    one->alone = true;
+    node.flush_scheduler.run_line(
+        [&] {
+            node.flush_scheduler.flush_soon(*one);
+            node.flush_scheduler.flush_soon(*two); // where more is in progress
+        },
+        [] { return true; });
+    BOOST_TEST(one->done == calls{"write"}, boost::test_tools::per_element());
+    BOOST_TEST(node.posted == 1);
+    take_turns();
+    BOOST_TEST(two->done == calls{"flush"}, boost::test_tools::per_element());
+    // The link of the line has something to write first.
+    node.flush_scheduler.run_line([&] { node.flush_scheduler.flush_soon(*one); }, [] { return false; });
+    BOOST_TEST(one->done.size() == 1U);
+    take_turns();
+    BOOST_TEST(one->done == (calls{"write", "flush"}), boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(a_turn_that_is_posted_while_a_line_is_processed_is_taken) {
+    node.flush_scheduler.run_line([&] { node.flush_scheduler.schedule_turn(); }, [] { return true; });
+    BOOST_TEST(node.posted == 1);
+    one->alone = true; // until then, what waits goes with it
+    node.flush_scheduler.run_line([&] { node.flush_scheduler.flush_soon(*one); }, [] { return true; });
+    BOOST_TEST(node.posted == 1);
+    take_turns();
+    BOOST_TEST(one->done == calls{"flush"}, boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(an_exception_in_a_line_leaves_the_rest_for_the_turn) {
+    const auto fails = [&] {
+        node.flush_scheduler.flush_soon(*one);
+        throw std::runtime_error{"a handler's"};
+    };
+    BOOST_CHECK_THROW(node.flush_scheduler.run_line(fails, [] { return true; }), std::runtime_error);
+    BOOST_TEST(node.posted == 1);
+    take_turns();
+    BOOST_TEST(one->done == calls{"flush"}, boost::test_tools::per_element());
 }
 
 BOOST_AUTO_TEST_CASE(an_exception_during_a_write_does_not_affect_the_others) {

@@ -69,9 +69,9 @@ struct counters {
     std::array<std::uint64_t, verb_count> requests{}; ///< served, by verb
     std::uint64_t errors = 0;                         ///< answered with an error
     std::uint64_t errors_unsent = 0;                  ///< errors that were not sent because of reply=no
-    std::uint64_t housekeeping = 0;                   ///< for membership and task discovery; not counted in `requests`
-    std::uint64_t housekeeping_errors = 0;            ///< of these, failed
-    std::uint64_t requests_repeated = 0;              ///< by datagram, and so not run again
+    std::uint64_t housekeeping = 0;        ///< for membership, task discovery and sharing; not counted in `requests`
+    std::uint64_t housekeeping_errors = 0; ///< of these, failed
+    std::uint64_t requests_repeated = 0;   ///< by datagram, and so not run again
     std::uint64_t requests_sent = 0;
     std::uint64_t requests_resent = 0; ///< retransmitted by datagram
     std::uint64_t replies_dropped = 0; ///< malformed, or for no request in flight
@@ -95,9 +95,9 @@ struct counters {
     std::uint64_t entries_dropped = 0;        ///< entries of tables that could not be parsed
     std::uint64_t grants_sent = 0;            ///< of free slots, to other nodes
     std::uint64_t grants_received = 0;        ///< from other nodes
-    std::uint64_t grants_refused = 0;         ///< jobs that came without a valid grant
-    std::uint64_t jobs_moved_in = 0;          ///< jobs of other nodes that were run here
-    std::uint64_t jobs_moved_out = 0;         ///< jobs that other nodes run, or have run
+    std::uint64_t granted_jobs_refused = 0;   ///< jobs of other nodes that came without a valid grant, or may not move
+    std::uint64_t jobs_moved_in = 0;          ///< jobs of other nodes that were run here, and have ended
+    std::uint64_t jobs_moved_out = 0;         ///< jobs that were sent to other nodes, and have ended
     std::uint64_t leases_expired = 0;
     std::uint64_t datagrams_withheld = 0; ///< to unverified addresses, beyond their share
     std::uint64_t datagrams_unsealed = 0; ///< dropped with security; filled in when they are shown
@@ -123,7 +123,7 @@ BOOST_DESCRIBE_STRUCT(
      requests_sent, requests_resent, replies_dropped, updates_published, nouns_retired, updates_delivered, updates_shed,
      updates_too_large, updates_received, updates_dropped, updates_unsigned, announcements_sent, announcements_received,
      announcements_dropped, announcements_foreign, peers_known, peers_refused, tables_asked, tables_failed, tables_told,
-     entries_dropped, grants_sent, grants_received, grants_refused, jobs_moved_in, jobs_moved_out, leases_expired,
+     entries_dropped, grants_sent, grants_received, granted_jobs_refused, jobs_moved_in, jobs_moved_out, leases_expired,
      datagrams_withheld, datagrams_unsealed, group_received, group_dropped, group_repeated, group_sent, group_unsent,
      group_leases, links_open, links_accepted, links_refused, links_evicted, links_lost, bytes_received, bytes_sent))
 

@@ -31,35 +31,33 @@ bool direct_links::is_lost(const failure& f, std::string_view node, const member
     return f.alive || others.last_seen(node) > f.first;
 }
 
-bool direct_links::may_have(std::string_view node, const membership& others) const {
+direct_links::state direct_links::state_of(std::string_view node, const membership& others) const {
+    if (!contains(allowed_, node)) { // most nodes, where only neighbours are
+        return state::none;
+    }
     const auto where = others.address_of(node);
-    return where && !where->empty() && allows(node, others);
-}
-
-bool direct_links::reaches(std::string_view node, const membership& others) const {
-    if (!may_have(node, others)) {
-        return false;
+    if (!where || where->empty() || !allows(node, others)) {
+        return state::none;
     }
-    const auto failed = failed_.find(node);
-    return failed == failed_.end() || !is_lost(failed->second, node, others);
-}
-
-bool direct_links::is_lost_since(std::string_view node, const membership& others, time_point before) const {
-    const auto failed = failed_.find(node);
-    return failed != failed_.end() && failed->second.first <= before && is_lost(failed->second, node, others);
-}
-
-bool direct_links::may_try(std::string_view node, const membership& others, time_point now) const {
-    if (!may_have(node, others)) {
-        return false;
+    if (const auto failed = failed_.find(node); failed != failed_.end()) {
+        return is_lost(failed->second, node, others) ? state::lost : state::silent;
     }
+    return open_.contains(node) ? state::open : state::untried;
+}
+
+time_point direct_links::failed_at(std::string_view node) const {
     const auto failed = failed_.find(node);
-    return failed == failed_.end() || failed->second.next <= now || !is_lost(failed->second, node, others);
+    return failed == failed_.end() ? time_point::max() : failed->second.first;
+}
+
+bool direct_links::is_due(std::string_view node, time_point now) const {
+    const auto failed = failed_.find(node);
+    return failed != failed_.end() && failed->second.next <= now;
 }
 
 bool direct_links::on_failure(std::string_view node, time_point now) {
     const auto [at, is_new] = failed_.try_emplace(std::string{node});
-    erase_key(confirmed_, node);
+    erase_key(open_, node);
     if (is_new) {
         at->second.first = now;
     }
@@ -87,15 +85,15 @@ std::vector<std::string> direct_links::take_lost(const membership& others) {
 }
 
 bool direct_links::on_success(std::string_view node) {
-    if (!confirmed_.contains(node)) {
-        confirmed_.emplace(node);
+    if (!open_.contains(node)) {
+        open_.emplace(node);
     }
     return erase_key(failed_, node);
 }
 
 void direct_links::forget(std::string_view node) {
     erase_key(failed_, node);
-    erase_key(confirmed_, node);
+    erase_key(open_, node);
 }
 
 } // namespace cles::core

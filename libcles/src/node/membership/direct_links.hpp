@@ -7,6 +7,7 @@
 #include "node/membership/membership.hpp"
 
 #include <chrono>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <string>
@@ -33,16 +34,19 @@ class direct_links {
 
     /// Whether both nodes' `links` allow it.
     [[nodiscard]] bool allows(std::string_view node, const membership& others) const;
-    /// Whether requests for the node are sent straight to it: the link is not lost.
-    [[nodiscard]] bool reaches(std::string_view node, const membership& others) const;
-    /// Whether requests for others can be sent through the node: no attempt has failed.
-    [[nodiscard]] bool works(std::string_view node, const membership& others) const {
-        return !failed_.contains(node) && reaches(node, others);
-    }
-    /// Whether the node may be asked for its table: the link is not lost, or it is time for another attempt.
-    [[nodiscard]] bool may_try(std::string_view node, const membership& others, time_point now) const;
-    /// Whether the link has been lost since before that time.
-    [[nodiscard]] bool is_lost_since(std::string_view node, const membership& others, time_point before) const;
+
+    enum class state : std::uint8_t {
+        none,    ///< the node has no address, or `links` do not allow it
+        untried, ///< no attempt has failed, and none has succeeded
+        open,    ///< the node has replied since the last failure
+        silent,  ///< an attempt has failed: the node may have crashed
+        lost,    ///< an attempt has failed, and the node is alive
+    };
+    [[nodiscard]] state state_of(std::string_view node, const membership& others) const;
+    /// When the first attempt failed, of a link that is silent or lost.
+    [[nodiscard]] time_point failed_at(std::string_view node) const;
+    /// Whether it is time for another attempt, of a link that is silent or lost.
+    [[nodiscard]] bool is_due(std::string_view node, time_point now) const;
 
     /// A link to the node could not be opened, or the node does not reply on it. Returns whether that is new.
     bool on_failure(std::string_view node, time_point now);
@@ -52,9 +56,7 @@ class direct_links {
     [[nodiscard]] std::vector<std::string> take_lost(const membership& others);
     /// The node has replied on a link. Returns whether the last attempt had failed.
     bool on_success(std::string_view node);
-    /// Whether it has replied since the last failure.
-    [[nodiscard]] bool is_confirmed(std::string_view node) const noexcept { return confirmed_.contains(node); }
-    [[nodiscard]] bool has_failures() const noexcept { return !failed_.empty(); }
+    [[nodiscard]] bool has_failed(std::string_view node) const noexcept { return failed_.contains(node); }
     void forget(std::string_view node);
 
   private:
@@ -65,14 +67,12 @@ class direct_links {
         bool alive = false;
         bool is_reported = false;
     };
-    /// Whether the node has an address, and both nodes' `links` allow it.
-    [[nodiscard]] bool may_have(std::string_view node, const membership& others) const;
     [[nodiscard]] bool is_lost(const failure& f, std::string_view node, const membership& others) const;
 
     const std::string own_name_;
     std::vector<std::string> allowed_;
     std::map<std::string, failure, std::less<>> failed_;
-    std::set<std::string, std::less<>> confirmed_;
+    std::set<std::string, std::less<>> open_;
 };
 
 } // namespace cles::core

@@ -387,6 +387,12 @@ void discovery::on_peer(std::string_view node, membership::change what, std::str
             gossip_->on_gone(node, where, host_.now());
         }
         break;
+    case membership::change::relinked:
+        host_.post_log(log_level::debug, name + " states other links");
+        if (gossip_) {
+            gossip_->reach().on_links_announced(name);
+        }
+        break;
     case membership::change::clash:
         host_.post_log(log_level::warning,
                        name == host_.node().name

@@ -91,11 +91,12 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
     if (table.node.empty()) {
         reach_.on_reached(c->node);
     } else if (allowed && is_of_owner(table) && (c->node.empty() || c->node == table.node)) {
-        if (security_ == nullptr) { // otherwise the announcement states its addresses
-            others_.prefer_address(table.node, table.epoch, c->url);
+        // With security, its announcement states its addresses, of which this one works.
+        others_.prefer_address(table.node, table.epoch, c->url, security_ != nullptr);
+        if (security_ == nullptr || !c->node.empty()) { // otherwise anybody may have sent it
+            reach_.on_reply(table);
+            push_routes(now);
         }
-        reach_.on_reply(table);
-        push_routes(now);
     }
     if (table.node == self_.name && table.epoch == self_.epoch) {
         seeds_.on_self(c->url);
@@ -107,7 +108,7 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
         c->table_bytes = json.size();
         c->sent = now;
         c->ticket = ++last_ticket_;
-        out_.ask_description(c->ticket, c->url);
+        out_.ask_description(c->ticket, destination_of(*c));
     } else {
         c->since = table.next;
         seeds_.on_answer(c->url, table.node);
@@ -184,15 +185,15 @@ void gossip::write_delta(json_writer& w, const table_question& asked, std::size_
         return;
     }
     reach_.on_question(asked.routes, now);
-    core::write_delta(w, {self_.name, self_.epoch}, others_, asked, longest, now,
-                      [&](const delta_entry& item) { return reach_.advert_of(item, asked.routes.by); });
+    core::write_delta(w, {self_.name, self_.epoch}, others_, asked, longest, now, reach_.adverts_to(asked.routes.by));
 }
 
 bool gossip::on_pushed_table(std::string_view json, const observed_source& by, time_point now) {
     peer_table table;
     const bool good = read(json, max_pushed_entries, table);
     auto found = apply(table, by, now, now);
-    if (security_ == nullptr && contacts_.find_node(table.node) != nullptr && is_of_owner(table)) {
+    const bool is_from_node = security_ == nullptr || by.name == table.node;
+    if (is_from_node && contacts_.find_node(table.node) != nullptr && is_of_owner(table)) {
         reach_.on_pushed(table);
         push_routes(now);
     }
@@ -227,6 +228,10 @@ gossip::learned gossip::apply(const peer_table& table, const observed_source& by
 bool gossip::is_of_owner(const peer_table& table) const {
     const auto known = others_.find_member(table.node);
     return known && protocol::epoch_text(known->epoch) == table.epoch && table.pool == others_.pool();
+}
+
+gossip::client::destination gossip::destination_of(const contact& c) const noexcept {
+    return {c.url, security_ != nullptr ? std::string_view{c.node} : std::string_view{}};
 }
 
 bool gossip::read(std::string_view json, std::size_t max_entries, peer_table& table) const {
@@ -274,12 +279,13 @@ void gossip::push_routes(time_point now) {
         return;
     }
     for (auto& c : contacts_) {
+        const auto advert_of = reach_.adverts_to(c.node);
         for (auto next = news.begin(); !c.node.empty() && reach_.is_usable(c.node) && next != news.end();) {
             std::vector<peer_table::route> routes;
             std::vector<peer_table::route> wanted;
             for (; next != news.end() && std::max(routes.size(), wanted.size()) < max_pushed_routes; ++next) {
                 const auto item = others_.entry_of(next->first);
-                if (const auto advert = item ? reach_.advert_of(*item, c.node) : std::nullopt) {
+                if (const auto advert = item ? advert_of(*item) : std::nullopt) {
                     routes.push_back({item->epoch, *advert});
                 }
                 if (item && next->second) {
@@ -289,7 +295,7 @@ void gossip::push_routes(time_point now) {
             std::string table;
             json_writer w{table};
             write_routes(w, {self_.name, self_.epoch}, others_.pool(), routes, wanted);
-            out_.push(c.url, table);
+            out_.push(destination_of(c), table);
         }
     }
 }
@@ -337,6 +343,9 @@ void gossip::on_deadline(time_point now) {
 }
 
 void gossip::review(time_point now) {
+    if (security_ != nullptr) { // otherwise a reply itself tells the address, see `on_answer`
+        seeds_.prefer_in(others_);
+    }
     contacts_.expire_resting(now);
     drop_unresponsive(now);
     choose_successor(now);
@@ -482,7 +491,7 @@ void gossip::call(contact& c, time_point now) {
     ++counts_.tables_asked;
     c.sent = now;
     c.ticket = ++last_ticket_;
-    out_.ask(c.ticket, c.url,
+    out_.ask(c.ticket, destination_of(c),
              {.since = c.since, .describe = c.describe, .routes = {.distance = reach_.need(now), .by = self_.name}});
 }
 
@@ -495,7 +504,7 @@ void gossip::send_own_entry(contact& c, time_point now) {
     std::string table;
     json_writer w{table};
     write_own_entry(w, *own, now);
-    out_.push(c.url, table);
+    out_.push(destination_of(c), table);
 }
 
 // A node that is no other node's successor would otherwise remain unknown.
@@ -525,8 +534,8 @@ void gossip::end(contact& c, bool rests, time_point now) {
 }
 
 void gossip::sweep() {
-    for (const auto& url : contacts_.take_ended()) {
-        out_.release(url);
+    for (const auto& c : contacts_.take_ended(security_ != nullptr)) {
+        out_.release(destination_of(c));
     }
 }
 

@@ -40,14 +40,19 @@ class gossip : private deadline {
         client() = default;
         client(const client&) = delete;
         client& operator=(const client&) = delete;
-        /// `PULL self:cles/peers since=... describe=... routes=...` at `url`, without those that are empty.
-        virtual void ask(std::uint64_t ticket, std::string_view url, const table_question& what) = 0;
-        /// `PULL self:cles` at `url`.
-        virtual void ask_description(std::uint64_t ticket, std::string_view url) = 0;
-        /// `PUSH self:cles/peers` at `url`; the outcome is not reported.
-        virtual void push(std::string_view url, std::string_view table) = 0;
-        /// No requests follow at `url` for a while.
-        virtual void release(std::string_view url) = 0;
+        /// Where to send a request. With a `node`, only that member may answer there.
+        struct destination {
+            std::string_view url;
+            std::string_view node{}; ///< empty without security, and as long as it is not known
+        };
+        /// `PULL self:cles/peers since=... describe=... routes=...`, without those that are empty.
+        virtual void ask(std::uint64_t ticket, const destination& at, const table_question& what) = 0;
+        /// `PULL self:cles`.
+        virtual void ask_description(std::uint64_t ticket, const destination& at) = 0;
+        /// `PUSH self:cles/peers`; the outcome is not reported.
+        virtual void push(const destination& at, std::string_view table) = 0;
+        /// No requests follow there for a while.
+        virtual void release(const destination& at) = 0;
         /// A signed announcement states this version of its node's roster.
         virtual void on_stated_roster(std::string_view, std::uint32_t) {}
 
@@ -120,6 +125,7 @@ class gossip : private deadline {
     void notice_silence(time_point now);
     [[nodiscard]] std::chrono::nanoseconds silence_of(const contact& c) const;
     [[nodiscard]] bool is_of_owner(const peer_table& table) const;
+    [[nodiscard]] client::destination destination_of(const contact& c) const noexcept;
     bool read(std::string_view json, std::size_t max_entries, peer_table& table) const;
 
     void on_deadline(time_point now) override;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/membership/gossip_contacts.hpp"
 
+#include "protocol/request_line.hpp"
+
 #include <algorithm>
 #include <utility>
 
@@ -49,15 +51,18 @@ void gossip_contacts::expire_resting(time_point now) {
     std::erase_if(resting_, [now](const resting& r) { return r.until <= now; });
 }
 
-std::vector<std::string> gossip_contacts::take_ended() {
-    std::vector<std::string> urls;
+std::vector<gossip_contact> gossip_contacts::take_ended(bool by_name) {
+    std::vector<contact> found;
     for (const auto& c : all_) {
-        if (c.ended && first_of(all_, [&c](const contact& other) { return other.url == c.url; }) == nullptr) {
-            urls.push_back(c.url);
+        const auto is_at_same_place = [&](const contact& other) {
+            return other.url == c.url && (!by_name || other.node == c.node);
+        };
+        if (c.ended && first_of(all_, is_at_same_place) == nullptr) {
+            found.push_back(c);
         }
     }
     std::erase_if(all_, [](const contact& c) { return c.ended; });
-    return urls;
+    return found;
 }
 
 // -- candidates ----------------------------------------------------------------------------------------------------
@@ -113,6 +118,16 @@ void seeds::on_answer(std::string_view url, std::string_view node) {
 void seeds::on_self(std::string_view url) {
     for (auto& s : all_) {
         s.self |= s.url == url;
+    }
+}
+
+void seeds::prefer_in(membership& others) const {
+    for (const auto& s : all_) {
+        const auto known = s.node.empty() ? std::nullopt : others.find_member(s.node);
+        const auto is_in_use = [&](const seed& other) { return other.node == s.node && other.url == known->where; };
+        if (known && std::none_of(all_.begin(), all_.end(), is_in_use)) {
+            others.prefer_address(s.node, protocol::epoch_text(known->epoch), s.url, true);
+        }
     }
 }
 

@@ -63,8 +63,9 @@ class gossip_contacts {
     [[nodiscard]] bool rests(std::string_view node, time_point now) const noexcept;
     void expire_resting(time_point now);
 
-    /// Removes the contacts that have ended; \returns the URLs at which no other contact is asked.
-    std::vector<std::string> take_ended();
+    /// Removes the contacts that have ended; \returns those at whose URLs no other contact is asked. `by_name`: nodes
+    /// at the same URL are told apart.
+    std::vector<contact> take_ended(bool by_name = false);
     void clear() noexcept { all_.clear(); }
 
     [[nodiscard]] auto begin() noexcept { return all_.begin(); }
@@ -144,6 +145,9 @@ class seeds {
     void on_answer(std::string_view url, std::string_view node);
     /// `url` leads to this node itself.
     void on_self(std::string_view url);
+    /// Has the nodes that replied be reached at the URLs where they did, if they have announced these. It may have
+    /// become known only later which they have announced, and the first one may lead nowhere from here.
+    void prefer_in(membership& others) const;
 
   private:
     struct seed {

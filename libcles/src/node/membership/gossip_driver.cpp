@@ -6,7 +6,11 @@
 #include "node/membership/gossip.hpp"
 #include "node/routing/peer_channels.hpp"
 #include "node/session/outbound.hpp"
+#include "port/node_security.hpp"
 #include "protocol/request_line.hpp"
+
+#include <boost/system/errc.hpp>
+#include <boost/system/error_code.hpp>
 
 #include <memory>
 #include <string>
@@ -24,7 +28,7 @@ class gossip_driver final : private gossip::client, public gossip {
           host_(host) {}
 
   private:
-    void ask(std::uint64_t ticket, std::string_view url, const table_question& what) override {
+    void ask(std::uint64_t ticket, const destination& at, const table_question& what) override {
         auto adverbs = "since=" + std::string{what.since};
         if (!what.describe.empty()) {
             adverbs.append(" describe=").append(what.describe);
@@ -32,22 +36,35 @@ class gossip_driver final : private gossip::client, public gossip {
         if (what.routes.distance != 0) {
             adverbs.append(" routes=").append(std::to_string(what.routes.distance)).append(".").append(what.routes.by);
         }
-        send(url, {.verb = verb::pull, .noun = "self:cles/peers", .adverbs = adverbs},
+        send(at, {.verb = verb::pull, .noun = "self:cles/peers", .adverbs = adverbs},
              reply_to(ticket, &gossip::on_answer));
     }
-    void ask_description(std::uint64_t ticket, std::string_view url) override {
-        send(url, {.verb = verb::pull, .noun = "self:cles"}, reply_to(ticket, &gossip::on_description));
+    void ask_description(std::uint64_t ticket, const destination& at) override {
+        send(at, {.verb = verb::pull, .noun = "self:cles"}, reply_to(ticket, &gossip::on_description));
     }
-    void push(std::string_view url, std::string_view table) override {
-        send(url, {.verb = verb::push, .noun = "self:cles/peers", .body = table},
+    void push(const destination& at, std::string_view table) override {
+        send(at, {.verb = verb::push, .noun = "self:cles/peers", .body = table},
              detail::pending_ptr{new discarded_reply});
     }
     // Posted, because the last reply may have just arrived on this link.
-    void release(std::string_view url) override {
-        host_.post_while_running([url = std::string{url}](local_node& host) { host.peer_channels().release(url); });
+    void release(const destination& at) override {
+        host_.post_while_running([url = std::string{at.url}, node = std::string{at.node}](local_node& host) {
+            host.peer_channels().release(url, node);
+        });
     }
 
-    [[nodiscard]] bool forwards() const override { return host_.node().active_router != nullptr; }
+    [[nodiscard]] bool forwards_for(std::string_view neighbour) const override {
+        return host_.node().active_router != nullptr && may_forward(host_.node().name, neighbour);
+    }
+    [[nodiscard]] bool may_forward(std::string_view forwarder, std::string_view requester) const override {
+        const auto& node = host_.node();
+        return !node.security ||
+               node.security->may_forward(forwarder, requester.empty() ? std::string_view{node.name} : requester);
+    }
+    [[nodiscard]] bool is_member(std::string_view node) const override {
+        const auto& security = host_.node().security;
+        return !security || security->is_member(node);
+    }
     // Posted, because they may be called from inside the channels.
     void on_route_lost(std::string_view node, std::string_view address) override {
         host_.post_while_running([node = std::string{node}, address = std::string{address}](local_node& host) {
@@ -68,20 +85,27 @@ class gossip_driver final : private gossip::client, public gossip {
     /// The operation of a request, whose reply is passed to `taken`. This lives as long as the node.
     detail::pending_ptr reply_to(std::uint64_t ticket,
                                  void (gossip::*taken)(std::uint64_t, std::string_view, time_point)) {
-        return detail::pending_ptr{new peer_reply{
-            host_.weak_from_this(), [this, ticket, taken](local_node& host, const peer_answer& answer) {
-                if (answer.code) {
-                    // A refusal is a reply, and what failed here says nothing about the link.
-                    const bool silent =
-                        !answer.refused && (answer.code == errc::unavailable || answer.code == errc::deadline);
-                    on_failure(ticket, host.now(), silent);
-                } else {
-                    (this->*taken)(ticket, answer.json, host.now());
-                }
-            }}};
+        return detail::pending_ptr{
+            new peer_reply{host_.weak_from_this(), [this, ticket, taken](local_node& host, const peer_answer& answer) {
+                               if (answer.code) {
+                                   on_failure(ticket, host.now(), !answer.refused && is_of_link(answer.code));
+                               } else {
+                                   (this->*taken)(ticket, answer.json, host.now());
+                               }
+                           }}};
     }
-    void send(std::string_view url, const protocol::outgoing_request& request, detail::pending_ptr operation) {
-        host_.peer_channels().send("self", url, request, host_.now() + limit, std::move(operation), {});
+    /// Whether the link is to blame: it could not be opened, was lost, or carries nothing.
+    static bool is_of_link(boost::system::error_code code) {
+        return code == errc::unavailable || code == errc::deadline ||
+               (code.category() != error_category() && code != boost::system::errc::too_many_files_open);
+    }
+    void send(const destination& at, const protocol::outgoing_request& request, detail::pending_ptr operation) {
+        const auto due = host_.now() + limit;
+        if (at.node.empty()) {
+            host_.peer_channels().send("self", at.url, request, due, std::move(operation), {});
+        } else {
+            host_.peer_channels().send_to_node(at.node, at.url, request, due, std::move(operation));
+        }
     }
 
     local_node& host_;

@@ -86,7 +86,7 @@ bool incarnation::is_significant_load_change(const node_load& now) const noexcep
 
 void incarnation::apply(const sighting& w, std::uint64_t& numbers) {
     const bool placed = apply_endpoints(w);
-    const bool describes = w.seq != 0 || !w.announced.tasks.empty();
+    const bool describes = w.describes();
     if (placed || is_significant_load_change(w.announced.load) || announced.roster != w.announced.roster ||
         (describes && (announced.tasks != w.announced.tasks || announced.signed_tasks != w.announced.signed_tasks ||
                        announced.links != w.announced.links))) {

@@ -111,6 +111,8 @@ struct sighting {
 
     [[nodiscard]] bool is_from_gossip() const noexcept { return from == group_source{}; }
     [[nodiscard]] bool is_signed() const noexcept { return announced.original != nullptr; }
+    /// Whether it contains more than an address, as a plain table does.
+    [[nodiscard]] bool describes() const noexcept { return seq != 0 || !announced.tasks.empty(); }
 };
 
 /// What is known of a node from one start to the next.

@@ -251,8 +251,13 @@ membership::verdict membership::take_owner_sighting(entries::iterator at, const 
         return verdict::taken;
     }
     const std::string before{r.where()};
+    const bool relinked = w.describes() && r.announced.links != w.announced.links;
     r.apply(w, revision_);
     on_owner_seen(*at, before != r.where(), w.is_from_gossip(), now);
+    if (relinked) {
+        const auto name = w.announced.node;
+        notify(name, change::relinked, address_of(name).value_or(std::string_view{}));
+    }
     return verdict::taken;
 }
 
@@ -577,7 +582,7 @@ const std::string* membership::owner_of(std::uint32_t epoch) const noexcept {
     return found != nullptr && found->second.owner.epoch == epoch ? &found->first : nullptr;
 }
 
-void membership::prefer_address(std::string_view node, std::string_view epoch, std::string_view url) {
+void membership::prefer_address(std::string_view node, std::string_view epoch, std::string_view url, bool announced) {
     const auto at = peers_.find(node);
     if (at == peers_.end() || protocol::epoch_text(at->second.owner.epoch) != epoch) {
         return;
@@ -585,7 +590,7 @@ void membership::prefer_address(std::string_view node, std::string_view epoch, s
     auto& all = at->second.owner.endpoints;
     const auto scheme = url.substr(0, url.find(':') + 1);
     if (at->second.owner.from != group_source{} || all.empty() || all.front() == url ||
-        !all.front().starts_with(scheme)) {
+        !all.front().starts_with(scheme) || (announced && std::ranges::find(all, url) == all.end())) {
         return;
     }
     std::erase(all, url);
@@ -601,6 +606,14 @@ void membership::touch(std::string_view node) {
     if (const auto at = peers_.find(node); at != peers_.end()) {
         at->second.owner.revision = ++revision_;
         freshen(*at);
+    }
+}
+
+void membership::touch(std::uint32_t epoch) {
+    auto* const found = by_epoch_.find(epoch);
+    if (found != nullptr && found->second.owner.epoch == epoch) {
+        found->second.owner.revision = ++revision_;
+        freshen(*found);
     }
 }
 

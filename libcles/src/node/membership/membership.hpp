@@ -44,6 +44,7 @@ class membership final : private deadline {
         gone,     ///< it was removed without a leave
         clash,    ///< a second live node has this name
         taken,    ///< this node's own name belongs to another live node, which was there first
+        relinked, ///< it has announced other `links`
     };
     /// Is notified after each change. `where`: the URL at which the node is or was reached, or for `clash` where the
     /// contender was received from. It may be empty.
@@ -132,10 +133,12 @@ class membership final : private deadline {
     /// The node of that incarnation; null if it is unknown, or not the owner of its name.
     [[nodiscard]] const std::string* owner_of(std::uint32_t epoch) const noexcept;
     /// That incarnation of the node has replied at the URL: it is used instead of an address of the same kind that
-    /// others have reported.
-    void prefer_address(std::string_view node, std::string_view epoch, std::string_view url);
+    /// others have reported. `announced`: only if it is one of those that the node announces.
+    void prefer_address(std::string_view node, std::string_view epoch, std::string_view url, bool announced = false);
     /// Reports the node again to those that ask for changes.
     void touch(std::string_view node);
+    /// The same for the owner of a name, by its epoch.
+    void touch(std::uint32_t epoch);
     /// All such URLs, the preferred one first; null if it is unknown.
     [[nodiscard]] const std::vector<std::string>* endpoints_of(std::string_view node) const noexcept;
     /// The number of other nodes.

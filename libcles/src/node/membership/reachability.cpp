@@ -17,13 +17,49 @@ constexpr std::uint64_t number_of_life = 2;
 
 // -- for the rest of the node ----------------------------------------------------------------------------------------
 
-void reachability::allow_only(std::vector<std::string> nodes) { direct_.allow_only(std::move(nodes)); }
+void reachability::allow_only(std::vector<std::string> nodes) {
+    std::vector<std::string> before;
+    others_.for_each([&](const membership::member& k) {
+        if (allows(k.node)) {
+            before.emplace_back(k.node);
+        }
+    });
+    direct_.allow_only(std::move(nodes));
+    std::vector<std::string> changed;
+    others_.for_each([&](const membership::member& k) {
+        if (allows(k.node) != std::ranges::binary_search(before, k.node)) {
+            changed.emplace_back(k.node);
+        }
+    });
+    for (const auto& node : changed) {
+        on_links_announced(node);
+    }
+}
 
-std::string reachability::next_hop_to(std::string_view node, std::string_view via) const {
-    if (direct_.reaches(node, others_)) {
+bool reachability::is_direct(std::string_view node) const {
+    using enum direct_links::state;
+    const auto now = direct_.state_of(node, others_);
+    return now != none && now != lost;
+}
+
+bool reachability::is_usable(std::string_view neighbour) const {
+    using enum direct_links::state;
+    const auto now = direct_.state_of(neighbour, others_);
+    return now == untried || now == open;
+}
+
+bool reachability::may_ask(std::string_view node, time_point now) const {
+    return is_direct(node) ||
+           (direct_.is_due(node, now) && direct_.state_of(node, others_) == direct_links::state::lost);
+}
+
+std::string reachability::next_hop_to(std::string_view node, std::string_view via, std::string_view requester) const {
+    if (is_direct(node)) {
         return std::string{node};
     }
-    const auto hop = routes_.next_hop(node, usable(), [via](std::string_view by) { return is_in_via(via, by); });
+    const auto hop = routes_.next_hop(node, usable(), [&](std::string_view by) {
+        return is_in_via(via, by) || (!requester.empty() && by != node && !out_.may_forward(by, requester));
+    });
     if (!hop.empty()) {
         return std::string{hop};
     }
@@ -35,7 +71,7 @@ bool reachability::is_beyond(std::string_view node) const {
 }
 
 std::optional<unsigned> reachability::hops_to(std::string_view node) const {
-    return direct_.reaches(node, others_) ? std::optional{1U} : routes_.hops_to(node, usable());
+    return is_direct(node) ? std::optional{1U} : routes_.hops_to(node, usable());
 }
 
 void reachability::add_routes(std::vector<peer>& all) const {
@@ -47,25 +83,12 @@ void reachability::add_routes(std::vector<peer>& all) const {
     }
 }
 
-std::string reachability::node_at(std::string_view url) const {
-    std::string node;
-    others_.for_each([&](const membership::member& k) {
-        if (k.where == url && !k.suspect) {
-            node = k.node;
-        }
-    });
-    return node;
-}
+void reachability::on_unreachable(std::string_view node, time_point now) { lose(node, now); }
 
-void reachability::on_unreachable(std::string_view url, time_point now) {
-    if (const auto node = node_at(url); !node.empty()) {
-        lose(node, now);
-    }
-}
-
-void reachability::on_opened(std::string_view url) {
-    if (direct_.has_failures()) {
-        on_reached(node_at(url));
+// That somebody accepts a link there does not show that it is the node, but the attempts to reach it no longer fail.
+void reachability::on_opened(std::string_view node) {
+    if (direct_.has_failed(node)) {
+        on_reached(node);
     }
 }
 
@@ -75,9 +98,32 @@ void reachability::on_reached(std::string_view node) {
     }
 }
 
+void reachability::on_links_announced(std::string_view node) {
+    reconsider(node);
+    if (!allows(node)) {
+        out_.on_route_lost(node, address_of(node));
+        leave(node);
+    }
+}
+
 void reachability::on_new_incarnation(std::string_view node) {
     direct_.forget(node);
     routes_.forget(node);
+}
+
+// All routes are compared again. A feed over one that no longer counts binds by another.
+void reachability::on_rights_changed() {
+    for (const auto& name : routes_.destinations()) {
+        for (const auto& by : routes_.neighbours_of(name)) {
+            if (by != name && !out_.may_forward(by, {})) {
+                out_.on_route_lost(name, address_of(by));
+            }
+        }
+        others_.touch(name);
+        out_.on_route_changed(name);
+        unsent_.try_emplace(name);
+        request_if_needed(name);
+    }
 }
 
 // -- the need for routes ---------------------------------------------------------------------------------------------
@@ -90,9 +136,8 @@ unsigned reachability::own_need(time_point now) const {
     }
     unsigned need = 0;
     others_.for_each([&](const membership::member& k) {
-        if (need < everywhere && !k.suspect && !k.where.empty() && !direct_.reaches(k.node, others_)) {
-            const bool lasts =
-                !allows(k.node) || direct_.is_lost_since(k.node, others_, now - interval() * intervals_of_need);
+        if (need < everywhere && !k.suspect && !k.where.empty() && !is_direct(k.node)) {
+            const bool lasts = !allows(k.node) || direct_.failed_at(k.node) <= now - interval() * intervals_of_need;
             need = lasts ? everywhere : 1;
         }
     });
@@ -115,24 +160,41 @@ void reachability::on_question(const protocol::routes_question& asked, time_poin
     }
     if (now - interval_began_ >= interval()) {
         interval_began_ = now;
-        ++number_;
+        number_ = std::min(number_ + 1, max_number);
     }
 }
 
 // -- routes ----------------------------------------------------------------------------------------------------------
 
-std::optional<route_advert> reachability::advert_of(const delta_entry& item, std::string_view to) {
+route_table::usable_function reachability::usable_now() const {
+    return [this, known = std::vector<std::pair<std::string, bool>>{}](std::string_view by) mutable {
+        const auto found = std::ranges::find(known, by, &std::pair<std::string, bool>::first);
+        if (found != known.end()) {
+            return found->second;
+        }
+        return known.emplace_back(by, is_usable(by) && out_.may_forward(by, {})).second;
+    };
+}
+
+route_function reachability::adverts_to(std::string_view to) {
+    return [this, to = std::string{to}, works = usable_now()](const delta_entry& item) {
+        return advert_of(item, to, works);
+    };
+}
+
+std::optional<route_advert> reachability::advert_of(const delta_entry& item, std::string_view to,
+                                                    const route_table::usable_function& works) {
     if (item.what == delta_entry::kind::leave || item.state == peer_state::clash) {
         return {};
     }
     if (item.node == own_name_) {
         return route_advert{number_, 0};
     }
-    if (!out_.forwards() || item.node == to) {
+    if (!out_.forwards_for(to) || item.node == to || !out_.is_member(item.node)) {
         return {};
     }
-    const bool direct = is_usable(item.node) && direct_.is_confirmed(item.node);
-    return routes_.advertise(item.node, item.epoch, direct, usable(), to);
+    const bool direct = direct_.state_of(item.node, others_) == direct_links::state::open;
+    return routes_.advertise(item.node, item.epoch, direct, works, to);
 }
 
 void reachability::on_reply(const peer_table& table) {
@@ -140,45 +202,54 @@ void reachability::on_reply(const peer_table& table) {
     apply(table);
 }
 
+// What a neighbour may state: a route of no links to itself, and as a forwarder longer ones to others.
 void reachability::apply(const peer_table& table) {
-    const auto works = usable();
+    const bool forwards = out_.may_forward(table.node, {});
+    const auto works = usable_now();
     for (const auto& [epoch, advert] : table.routes) {
         if (advert.seq > max_number) {
             continue;
         }
         if (others_.own() != nullptr && others_.own()->epoch == epoch) { // nobody may be ahead of this node
-            number_ = std::max(number_, advert.seq);
+            number_ = forwards ? std::max(number_, advert.seq) : number_;
             continue;
         }
         const auto* const node = others_.owner_of(epoch);
-        if (node == nullptr) {
+        const bool is_own = node != nullptr && *node == table.node;
+        if (node == nullptr || (advert.hops && (*advert.hops == 0) != is_own) ||
+            !(is_own || (forwards && out_.is_member(*node)))) {
             continue;
         }
-        const std::string name{*node};
-        const bool was_offered = routes_.is_offered(name, table.node);
-        const auto before = routes_.in_use(name, works);
-        routes_.apply(name, epoch, table.node, advert);
-        const auto after = routes_.in_use(name, works);
-        if (before != after) {
-            others_.touch(name);
-            request_if_needed(name);
-        }
-        if (before.by != after.by) {
-            out_.on_route_changed(name);
-        }
-        const auto number = routes_.requested(name);
-        if (advert.hops && advert.seq >= number) {
-            direct_.on_alive(name);
-        }
-        if (before.by.empty() != after.by.empty() || before.hops != after.hops ||
-            (before.seq < number && after.seq >= number)) {
-            unsent_.try_emplace(name);
-        }
-        if (was_offered && !advert.hops && name != table.node) {
-            out_.on_route_lost(name, address_of(table.node));
-        }
+        apply(std::string{*node}, epoch, table.node, advert, works);
     }
     report_lost_links();
+}
+
+void reachability::apply(const std::string& name, std::uint32_t epoch, std::string_view neighbour, route_advert advert,
+                         const route_table::usable_function& works) {
+    const auto found = routes_.apply(name, epoch, neighbour, advert, works);
+    const auto& [was_offered, before, after, requested, missing] = found;
+    auto number = requested;
+    if (before != after) {
+        others_.touch(epoch);
+        if (missing != 0 && !is_usable(name)) {
+            request(name, missing, everywhere);
+            number = std::max(number, missing);
+        }
+    }
+    if (before.by != after.by) {
+        out_.on_route_changed(name);
+    }
+    if (advert.hops && advert.seq >= number) {
+        direct_.on_alive(name);
+    }
+    if (before.by.empty() != after.by.empty() || before.hops != after.hops ||
+        (before.seq < number && after.seq >= number)) {
+        unsent_.try_emplace(name);
+    }
+    if (was_offered && !advert.hops && name != neighbour) {
+        out_.on_route_lost(name, address_of(neighbour));
+    }
 }
 
 void reachability::on_pushed(const peer_table& table) {
@@ -192,13 +263,13 @@ void reachability::on_pushed(const peer_table& table) {
 void reachability::answer(const peer_table::route& wanted, std::string_view neighbour) {
     const auto& [epoch, asked] = wanted;
     if (others_.own() != nullptr && others_.own()->epoch == epoch) {
-        number_ = std::max(number_, std::min(asked.seq, number_ + number_of_life));
+        number_ = std::max(number_, std::min({asked.seq, number_ + number_of_life, max_number}));
         others_.touch(own_name_);
         unsent_.try_emplace(own_name_);
         return;
     }
     const auto* const node = others_.owner_of(epoch);
-    if (node == nullptr || !out_.forwards()) {
+    if (node == nullptr || !out_.forwards_for(neighbour) || !out_.is_member(*node)) {
         return;
     }
     const auto item = others_.entry_of(*node);
@@ -234,6 +305,13 @@ void reachability::lose(std::string_view neighbour, time_point now) {
         return;
     }
     reconsider(neighbour);
+    leave(neighbour);
+    // A number that the node can have stated only after that shows that it is alive.
+    request(std::string{neighbour}, routes_.newest(neighbour) + number_of_life, everywhere);
+}
+
+// It cannot be used: other routes than those through it count.
+void reachability::leave(std::string_view neighbour) {
     for (const auto& name : routes_.destinations_by(neighbour)) {
         if (name != neighbour) {
             out_.on_route_lost(name, address_of(neighbour));
@@ -241,8 +319,6 @@ void reachability::lose(std::string_view neighbour, time_point now) {
         unsent_.try_emplace(name);
         request_if_needed(name);
     }
-    // A number that the node can have stated only after that shows that it is alive.
-    request(std::string{neighbour}, routes_.newest(neighbour) + number_of_life, everywhere);
 }
 
 // Whether that neighbour can be used has changed.

@@ -140,6 +140,7 @@ std::vector<std::string> endpoints_to_relay(const std::vector<std::string>& anno
 observed_source observed_source::of(const identity& peer) {
     auto found = at(peer.address);
     found.local = peer.local;
+    found.name = peer.name;
     return found;
 }
 

@@ -15,6 +15,7 @@ namespace cles::core {
 struct observed_source {
     std::string host;   ///< IP address without brackets; empty if there is none
     bool local = false; ///< this host: its loopback addresses and Unix sockets are usable
+    std::string name{}; ///< of the member at the other end of the link; empty: not proven
 
     static observed_source of(const group_source& from) { return {host_text(from), from.is_loopback()}; }
     /// The other end of a link.

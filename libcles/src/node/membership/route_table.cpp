@@ -2,6 +2,7 @@
 #include "node/membership/route_table.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <tuple>
 #include <utility>
 
@@ -16,63 +17,96 @@ void route_table::destination::note_advertised(std::uint64_t s, unsigned h) noex
     }
 }
 
-route_table::destination& route_table::entry_of(std::string_view name, std::uint32_t epoch) {
-    auto at = destinations_.find(name);
-    if (at == destinations_.end()) {
-        at = destinations_.emplace(name, destination{.epoch = epoch}).first;
-    } else if (at->second.epoch != epoch) {
-        at->second = {.epoch = epoch};
-    }
-    return at->second;
+const route_table::destination* route_table::find(std::string_view name) const {
+    const auto at = epochs_.find(name);
+    return at == epochs_.end() ? nullptr : &destinations_.at(at->second);
 }
 
-void route_table::apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour, route_advert offered) {
-    if (destinations_.size() >= max_destinations_ && !destinations_.contains(name)) {
-        return;
+route_table::destination* route_table::find(std::string_view name, std::uint32_t epoch) {
+    const auto at = destinations_.find(epoch);
+    return at == destinations_.end() || at->second.name != name ? nullptr : &at->second;
+}
+
+route_table::destination& route_table::entry_of(std::string_view name, std::uint32_t epoch) {
+    if (auto* const known = find(name, epoch)) {
+        return *known;
     }
-    auto& d = entry_of(name, epoch);
-    d.newest = std::max(d.newest, offered.seq);
-    const auto known = std::ranges::find(d.offers, neighbour, &offer::by);
+    forget(name);
+    if (const auto same = destinations_.find(epoch); same != destinations_.end()) { // two nodes with one epoch
+        forget(std::string{same->second.name});
+    }
+    epochs_.emplace(name, epoch);
+    return destinations_.emplace(epoch, destination{.name = std::string{name}}).first->second;
+}
+
+route_table::change route_table::apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour,
+                                       route_advert offered, const usable_function& usable) {
+    auto* d = find(name, epoch);
+    const auto* const known = d != nullptr ? d : find(name);
+    if (known == nullptr && size() >= max_destinations_) {
+        return {};
+    }
+    change found;
+    if (known != nullptr) {
+        found.was_offered = std::ranges::find(known->offers, neighbour, &offer::by) != known->offers.end();
+        found.before = copy_of(best(*known, usable, {}));
+    }
+    d = d != nullptr ? d : &entry_of(name, epoch);
+    d->take(neighbour, offered);
+    found.after = copy_of(best(*d, usable, {}));
+    found.requested = d->requested;
+    found.missing = missing_number(*d, usable);
+    return found;
+}
+
+void route_table::destination::take(std::string_view neighbour, route_advert offered) {
+    newest = std::max(newest, offered.seq);
+    const auto known = std::ranges::find(offers, neighbour, &offer::by);
     if (!offered.hops || *offered.hops >= max_hops) {
-        if (known != d.offers.end()) {
-            d.offers.erase(known);
+        if (known != offers.end()) {
+            offers.erase(known);
         }
-        return;
-    }
-    if (known != d.offers.end()) {
+    } else if (known != offers.end()) {
         known->seq = offered.seq;
         known->hops = *offered.hops;
-    } else if (d.offers.size() < max_offers) {
-        d.offers.push_back({std::string{neighbour}, offered.seq, *offered.hops});
-    } else if (auto& oldest = *std::ranges::min_element(d.offers, {}, &offer::seq); oldest.seq < offered.seq) {
+    } else if (offers.size() < max_offers) {
+        offers.push_back({std::string{neighbour}, offered.seq, *offered.hops});
+    } else if (auto& oldest = *std::ranges::min_element(offers, {}, &offer::seq); oldest.seq < offered.seq) {
         oldest = {std::string{neighbour}, offered.seq, *offered.hops};
     }
 }
 
 std::vector<std::string> route_table::destinations_by(std::string_view neighbour) const {
     std::vector<std::string> found;
-    for (const auto& [name, d] : destinations_) {
-        if (std::ranges::find(d.offers, neighbour, &offer::by) != d.offers.end()) {
+    for (const auto& [name, epoch] : epochs_) {
+        const auto& offers = destinations_.at(epoch).offers;
+        if (std::ranges::find(offers, neighbour, &offer::by) != offers.end()) {
             found.push_back(name);
         }
     }
     return found;
 }
 
-bool route_table::is_offered(std::string_view name, std::string_view neighbour) const {
-    const auto at = destinations_.find(name);
-    return at != destinations_.end() &&
-           std::ranges::find(at->second.offers, neighbour, &offer::by) != at->second.offers.end();
+std::vector<std::string> route_table::destinations() const {
+    std::vector<std::string> found;
+    for (const auto& [name, epoch] : epochs_) {
+        found.push_back(name);
+    }
+    return found;
 }
 
-route_table::route route_table::in_use(std::string_view name, const usable_function& usable) const {
-    const auto* const found = find(name, usable);
-    return found == nullptr ? route{} : *found;
+std::vector<std::string> route_table::neighbours_of(std::string_view name) const {
+    std::vector<std::string> found;
+    if (const auto* const d = find(name)) {
+        std::ranges::transform(d->offers, std::back_inserter(found), &offer::by);
+    }
+    return found;
 }
 
 void route_table::forget(std::string_view name) {
-    if (const auto at = destinations_.find(name); at != destinations_.end()) {
-        destinations_.erase(at);
+    if (const auto at = epochs_.find(name); at != epochs_.end()) {
+        destinations_.erase(at->second);
+        epochs_.erase(at);
     }
 }
 
@@ -94,8 +128,8 @@ const route_table::offer* route_table::best(const destination& d, const usable_f
 
 const route_table::offer* route_table::find(std::string_view name, const usable_function& usable,
                                             const std::function<bool(std::string_view)>& avoid) const {
-    const auto at = destinations_.find(name);
-    return at == destinations_.end() ? nullptr : best(at->second, usable, avoid);
+    const auto* const d = find(name);
+    return d == nullptr ? nullptr : best(*d, usable, avoid);
 }
 
 std::string_view route_table::next_hop(std::string_view name, const usable_function& usable,
@@ -110,12 +144,16 @@ std::optional<unsigned> route_table::hops_to(std::string_view name, const usable
 }
 
 std::uint64_t route_table::missing_number(std::string_view name, const usable_function& usable) const {
-    const auto at = destinations_.find(name);
-    if (at == destinations_.end() || at->second.hops > max_hops) {
+    const auto* const d = find(name);
+    return d == nullptr ? 0 : missing_number(*d, usable);
+}
+
+std::uint64_t route_table::missing_number(const destination& d, const usable_function& usable) const {
+    if (d.hops > max_hops) {
         return 0;
     }
-    const auto* const chosen = best(at->second, usable, {});
-    return chosen != nullptr && at->second.is_feasible(*chosen) ? 0 : at->second.seq + 1;
+    const auto* const chosen = best(d, usable, {});
+    return chosen != nullptr && d.is_feasible(*chosen) ? 0 : d.seq + 1;
 }
 
 bool route_table::request(std::string_view name, std::uint32_t epoch, std::uint64_t number) {
@@ -124,31 +162,26 @@ bool route_table::request(std::string_view name, std::uint32_t epoch, std::uint6
 }
 
 std::uint64_t route_table::newest(std::string_view name) const {
-    const auto at = destinations_.find(name);
-    return at == destinations_.end() ? 0 : at->second.newest;
-}
-
-std::uint64_t route_table::requested(std::string_view name) const {
-    const auto at = destinations_.find(name);
-    return at == destinations_.end() ? 0 : at->second.requested;
+    const auto* const d = find(name);
+    return d == nullptr ? 0 : d->newest;
 }
 
 route_advert route_table::advertise(std::string_view name, std::uint32_t epoch, bool direct,
                                     const usable_function& usable, std::string_view to) {
-    const auto at = destinations_.find(name);
-    if (!direct && (at == destinations_.end() || at->second.epoch != epoch)) {
-        return {};
-    }
-    auto& d = direct ? entry_of(name, epoch) : at->second;
     if (direct) { // no loop is possible, so the newest number counts, no matter which node stated it
+        auto& d = entry_of(name, epoch);
         d.note_advertised(d.newest, 1);
         return {d.newest, 1};
     }
-    const auto* const chosen = best(d, usable, {});
-    if (chosen == nullptr || chosen->by == to || !d.is_feasible(*chosen)) { // it would or may come back
-        return {.seq = d.newest};
+    auto* const d = find(name, epoch);
+    if (d == nullptr) {
+        return {};
     }
-    d.note_advertised(chosen->seq, chosen->hops + 1);
+    const auto* const chosen = best(*d, usable, {});
+    if (chosen == nullptr || chosen->by == to || !d->is_feasible(*chosen)) { // it would or may come back
+        return {.seq = d->newest};
+    }
+    d->note_advertised(chosen->seq, chosen->hops + 1);
     return {chosen->seq, chosen->hops + 1};
 }
 

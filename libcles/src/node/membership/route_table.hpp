@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 #include <vector>
 
 namespace cles::core {
@@ -37,11 +38,31 @@ class route_table {
 
     explicit route_table(std::size_t max_destinations) noexcept : max_destinations_(max_destinations) {}
 
+    /// A route, as its neighbour advertises it.
+    struct route {
+        std::string by; ///< empty: there is none
+        std::uint64_t seq = 0;
+        unsigned hops = 0;
+
+        bool operator==(const route&) const = default;
+    };
+    /// What an advertisement has changed.
+    struct change {
+        bool was_offered = false;    ///< by this neighbour
+        route before{};              ///< in use
+        route after{};               ///< the same
+        std::uint64_t requested = 0; ///< the greatest number that was asked for
+        std::uint64_t missing = 0;   ///< see `missing_number`
+    };
     /// Applies what a neighbour advertises. Another epoch is another destination: what was known is forgotten.
-    void apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour, route_advert offered);
+    change apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour, route_advert offered,
+                 const usable_function& usable);
     /// The destinations that this neighbour advertises.
     [[nodiscard]] std::vector<std::string> destinations_by(std::string_view neighbour) const;
     void forget(std::string_view name);
+    [[nodiscard]] std::vector<std::string> destinations() const;
+    /// Those that advertise it.
+    [[nodiscard]] std::vector<std::string> neighbours_of(std::string_view name) const;
 
     /// The neighbour to which a request is sent, by the shortest route that does not lead through a node for which
     /// `avoid` is true; empty: there is none.
@@ -50,16 +71,6 @@ class route_table {
     /// What this node advertises to the neighbour `to`. `direct`: it has a link to the destination.
     route_advert advertise(std::string_view name, std::uint32_t epoch, bool direct, const usable_function& usable,
                            std::string_view to);
-    [[nodiscard]] bool is_offered(std::string_view name, std::string_view neighbour) const;
-    /// The route in use, as its neighbour advertises it.
-    struct route {
-        std::string by; ///< empty: there is none
-        std::uint64_t seq = 0;
-        unsigned hops = 0;
-
-        bool operator==(const route&) const = default;
-    };
-    [[nodiscard]] route in_use(std::string_view name, const usable_function& usable) const;
     /// The length of the route in use, in links; nothing: there is none.
     [[nodiscard]] std::optional<unsigned> hops_to(std::string_view name, const usable_function& usable) const;
     /// Without a number of at least that, no route to the destination can be advertised again; 0: there is one, or
@@ -69,14 +80,12 @@ class route_table {
     bool request(std::string_view name, std::uint32_t epoch, std::uint64_t number);
     /// The greatest number that is known; 0: none.
     [[nodiscard]] std::uint64_t newest(std::string_view name) const;
-    /// The greatest number that was asked for; 0: none.
-    [[nodiscard]] std::uint64_t requested(std::string_view name) const;
-    [[nodiscard]] std::size_t size() const noexcept { return destinations_.size(); }
+    [[nodiscard]] std::size_t size() const noexcept { return epochs_.size(); }
 
   private:
     using offer = route;
     struct destination {
-        std::uint32_t epoch = 0;
+        std::string name{};
         std::uint64_t newest = 0;    ///< number that is known
         std::uint64_t requested = 0; ///< number that was asked for
         std::vector<offer> offers{};
@@ -89,7 +98,11 @@ class route_table {
         }
         [[nodiscard]] bool is_current(const offer& o) const noexcept { return newest - o.seq < max_late; }
         void note_advertised(std::uint64_t s, unsigned h) noexcept;
+        void take(std::string_view neighbour, route_advert offered);
     };
+
+    static route copy_of(const offer* o) { return o == nullptr ? route{} : *o; }
+    [[nodiscard]] std::uint64_t missing_number(const destination& d, const usable_function& usable) const;
 
     /// The route in use; null if there is none.
     [[nodiscard]] const offer* best(const destination& d, const usable_function& usable,
@@ -97,10 +110,15 @@ class route_table {
     /// The same by name; null too if the destination is unknown.
     [[nodiscard]] const offer* find(std::string_view name, const usable_function& usable,
                                     const std::function<bool(std::string_view)>& avoid = {}) const;
+    /// Null if it is unknown.
+    [[nodiscard]] const destination* find(std::string_view name) const;
+    [[nodiscard]] destination* find(std::string_view name, std::uint32_t epoch);
     destination& entry_of(std::string_view name, std::uint32_t epoch);
 
     std::size_t max_destinations_;
-    std::map<std::string, destination, std::less<>> destinations_;
+    std::map<std::string, std::uint32_t, std::less<>> epochs_; // by name
+    // By epoch, because tables name them so: with a thousand nodes, most of the time is spent here.
+    std::unordered_map<std::uint32_t, destination> destinations_;
 };
 
 } // namespace cles::core

@@ -55,9 +55,11 @@ class feed_links::feed_reply final : public detail::pending {
 
     verdict offer(std::string_view json) override { return take(json, {}); }
     verdict offer_marked(std::string_view json, const update_mark& mark) override { return take(json, mark); }
-    void fail(boost::system::error_code code, std::string_view message) override {
+    void fail(boost::system::error_code code, std::string_view message) override { refuse(code, message, {}); }
+    void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override {
         const std::string text{message};
-        finish({.code = code, .text = text});
+        const std::string whole{answer};
+        finish({.code = code, .text = text, .answer = whole});
     }
     void discard() noexcept override { delete this; }
     [[nodiscard]] bool calls_user() const noexcept override { return false; }
@@ -114,7 +116,7 @@ void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, 
             } else {
                 detach(feed);
             }
-            feed.on_refused(received.code, std::string{received.text}, host_.now());
+            feed.on_refused(received.code, received.text, host_.now(), received.answer);
             return;
         }
         last = "{}";
@@ -135,8 +137,8 @@ void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, 
 }
 
 void feed_links::enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms) {
-    feed.set_sharing_key("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) + " " +
-                         terms.adverbs);
+    feed.set_sharing_key("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) +
+                         " hops=" + std::to_string(terms.hops) + " " + terms.adverbs);
     feed.entry().handle = std::move(handle);
     feed.entry().terms = std::move(terms);
     feeds_.push_back(feed);
@@ -165,7 +167,8 @@ void feed_links::bind(core::feed_machine& feed) {
     auto& e = feed.entry();
     boost::system::error_code code;
     std::string why;
-    auto* r = host_.peer_channels().to(feed.target(), e.terms.at, false, code, why);
+    auto* r = host_.peer_channels().to(feed.target(), e.terms.at, false, code, why,
+                                       {.via = e.terms.via, .requester = e.terms.requester});
     if (r == nullptr) {
         refuse_later(feed, code, why);
         return;
@@ -247,6 +250,7 @@ protocol::outgoing_request feed_links::bind_request(core::feed_machine& feed, co
                                        .id = host_.draw_id(),
                                        .every_ms = e.terms.every_ms,
                                        .keep = e.terms.keep,
+                                       .hops = e.terms.hops,
                                        .adverbs = e.terms.adverbs};
     if (c.datagram() != 0) {
         request.lease_ms = static_cast<std::uint32_t>(host_.bounds().lease.count());
@@ -290,8 +294,10 @@ void feed_links::unbind(core::feed_machine& feed) {
     detach(feed);
     // Another feed may share the binding.
     if (c && c->usable() && !host_.stopped() && !c->session().bound().has(feed.target(), feed.path())) {
+        const auto& terms = feed.entry().terms;
+        const auto whose = terms.requester.empty() ? std::string{} : "from=" + terms.requester;
         c->session().asking().send(
-            {.verb = verb::bind, .noun = feed.entry().terms.noun, .id = host_.draw_id(), .lease_ms = 0},
+            {.verb = verb::bind, .noun = terms.noun, .id = host_.draw_id(), .lease_ms = 0, .adverbs = whose},
             core::saturating_add(now, time_limit({}, verb::bind)), now, detail::pending_ptr{new core::discarded_reply});
     }
 }

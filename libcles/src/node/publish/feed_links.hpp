@@ -47,6 +47,7 @@ class feed_links final : public core::feed_host {
         boost::system::error_code code{}; ///< why it failed
         std::string_view text;            ///< the body, or the message of the failure
         std::optional<update_mark> mark{};
+        std::string_view answer{}; ///< the failure as the peer wrote it, if it did
     };
     /// Unbinds the bound feeds that it concerns, and reports why; they bind again after a pause, or at once.
     void unbind_where(const std::function<bool(core::feed_machine&)>& concerns, const std::string& why,

@@ -106,15 +106,21 @@ void feed_machine::on_renewal_refused(time_point sent_at, boost::system::error_c
     }
 }
 
-void feed_machine::on_refused(boost::system::error_code why, std::string_view message, time_point now) {
+void feed_machine::on_refused(boost::system::error_code why, std::string_view message, time_point now,
+                              std::string_view answer) {
     if (state_ != state::binding) {
         return;
     }
     if (first_) {
         auto operation = std::move(first_);
         const std::string text{message};
+        const std::string whole{answer};
         close(errc::cancelled);
-        completions_.fail(std::move(operation), why, text);
+        if (protocol::failure reported; !whole.empty() && protocol::parse_failure(whole, reported)) {
+            completions_.refuse(std::move(operation), reported, whole);
+        } else {
+            completions_.fail(std::move(operation), why, text);
+        }
         return;
     }
     pause(now);

@@ -10,6 +10,7 @@
 #include "node/base/deadlines.hpp"
 #include "node/publish/feed_mailbox.hpp"
 #include "node/publish/subscription.hpp"
+#include "protocol/request_line.hpp"
 
 #include <boost/intrusive/list.hpp>
 
@@ -33,8 +34,11 @@ struct feed_terms {
     std::chrono::milliseconds deadline{};
     std::uint32_t every_ms = 0;
     std::uint32_t keep = 0;
-    std::string adverbs{}; ///< further ones, in wire format
-    bool marked = false;   ///< requests the mark of the last value, if the publisher supports it
+    std::uint32_t hops = protocol::default_hops;
+    std::string adverbs{};   ///< further ones, in wire format
+    bool marked = false;     ///< requests the mark of the last value, if the publisher supports it
+    std::string via{};       ///< nodes that have forwarded it
+    std::string requester{}; ///< the member for which this node binds it, if it is another one
 };
 
 /// What `feed_links` keeps for each feed.
@@ -92,7 +96,9 @@ class feed_machine final
     void on_renewed(time_point sent_at);
     void on_renewal_refused(time_point sent_at, boost::system::error_code why, std::string_view message,
                             time_point now);
-    void on_refused(boost::system::error_code why, std::string_view message, time_point now);
+    /// `answer`: the failure as the publisher wrote it; empty: it did not.
+    void on_refused(boost::system::error_code why, std::string_view message, time_point now,
+                    std::string_view answer = {});
     /// Whether the publisher has bound it again in spite of this error: only its last value does not fit into the
     /// reply. Then call `on_bound` without that value.
     [[nodiscard]] bool is_bound_without_value(boost::system::error_code why) const noexcept {

@@ -121,6 +121,16 @@ bool publications::retire(std::string_view path) {
     return true;
 }
 
+std::size_t publications::retire_all(std::string_view task) {
+    std::vector<std::string> paths;
+    for (const auto& [path, each] : topics_) {
+        if (task_of(path) == task) {
+            paths.push_back(path);
+        }
+    }
+    return static_cast<std::size_t>(std::ranges::count_if(paths, [this](const auto& path) { return retire(path); }));
+}
+
 void publications::retire(topic& t) {
     ++shared_.counts.nouns_retired;
     t.retire();

@@ -130,6 +130,8 @@ class publications final : public topic_source {
     [[nodiscard]] bool can_publish(std::string_view path) noexcept;
     /// Forgets the last value, and the noun too if nobody is bound to it. False if there is no value.
     bool retire(std::string_view path);
+    /// The same for all nouns of a task. Returns how many there were.
+    [[gnu::cold]] std::size_t retire_all(std::string_view task);
     /// Removes a topic without subscribers, waiters and value; one with a value becomes idle.
     void remove_if_unused(topic& t);
     /// A subscriber has gone: publishers that waited for it continue.

@@ -53,6 +53,17 @@ protocol::failure failure_of(boost::system::error_code code, const std::string& 
     return why;
 }
 
+/// The value of the adverb with that key, such as "via="; empty: it is missing.
+std::string_view value_in(std::string_view adverbs, std::string_view key) {
+    protocol::part_reader parts{adverbs};
+    for (auto part = parts.next(); !part.empty(); part = parts.next()) {
+        if (part.starts_with(key)) {
+            return part.substr(key.size());
+        }
+    }
+    return {};
+}
+
 /// A noun of another node, bound for this node's clients.
 class upstream_feed final : private detail::pending_event, public std::enable_shared_from_this<upstream_feed> {
   public:
@@ -74,7 +85,7 @@ class upstream_feed final : private detail::pending_event, public std::enable_sh
     [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
     void wait() { static_cast<void>(machine_.mail().next(pending_event_ptr{this})); }
-    void on_refused(boost::system::error_code code, std::string_view message);
+    void on_refused(const protocol::failure& why);
     void release_later();
 
     std::shared_ptr<local_node> host_;
@@ -96,7 +107,16 @@ class upstream_feed::first_answer final : public detail::pending {
     void fail(boost::system::error_code code, std::string_view message) override {
         const std::unique_ptr<first_answer> self{this};
         if (const auto alive = to_.lock()) {
-            alive->on_refused(code, message);
+            alive->on_refused(failure_of(code, alive->machine_.target(), message));
+        }
+    }
+    void refuse(boost::system::error_code, std::string_view, std::string_view answer) override {
+        const std::unique_ptr<first_answer> self{this};
+        if (const auto alive = to_.lock()) {
+            protocol::failure why;
+            protocol::parse_failure(answer, why);
+            why.answer = answer;
+            alive->on_refused(why);
         }
     }
     void discard() noexcept override { delete this; }
@@ -112,7 +132,9 @@ void upstream_feed::begin(std::string_view adverbs) {
                           .at = {},
                           .keep = upstream_keep,
                           .adverbs = std::string{adverbs},
-                          .marked = true});
+                          .marked = true,
+                          .via = std::string{value_in(adverbs, "via=")},
+                          .requester = std::string{value_in(adverbs, "from=")}});
     wait();
     machine_.start(detail::pending_ptr{new first_answer(weak_from_this())});
 }
@@ -129,10 +151,10 @@ void upstream_feed::release_later() {
     post(host_->environment(), [self = shared_from_this()] {});
 }
 
-void upstream_feed::on_refused(boost::system::error_code code, std::string_view message) {
+void upstream_feed::on_refused(const protocol::failure& why) {
     if (auto* to = std::exchange(to_, nullptr)) {
         release_later();
-        to->on_refused(failure_of(code, machine_.target(), message));
+        to->on_refused(why);
     }
 }
 
@@ -161,7 +183,9 @@ class peer_next_hop : public next_hop {
             host_.fail_later(std::move(reply), errc::stopped, {});
             return 0;
         }
-        return host_.peer_channels().send(r.target(), {}, r, deadline, std::move(reply), std::move(progress), via);
+        const auto requester = host_.node().security ? value_in(r.adverbs, "from=") : std::string_view{};
+        return host_.peer_channels().send(r.target(), {}, r, deadline, std::move(reply), std::move(progress),
+                                          {.via = via, .requester = requester});
     }
     void cancel(std::uint64_t ticket) override { host_.cancel(ticket); }
     std::shared_ptr<void> bind(std::string_view node, std::string_view path, std::string_view adverbs,
@@ -199,7 +223,7 @@ std::string forwarded_adverbs(const protocol::request_line& r, std::string_view 
     if (!r.sig.empty()) {
         out.append(" sig=").append(r.sig);
     }
-    append_foreign(out, r, max_foreign - (states_requester ? 1 : 0) - (r.sig.empty() ? 0 : 1));
+    append_foreign(out, r, max_foreign - (states_requester ? 1 : 0) - (r.sig.empty() ? 0 : 1) - (r.trace ? 1 : 0));
     return out;
 }
 

@@ -5,6 +5,7 @@
 #include "node/membership/gossip.hpp"
 #include "node/publish/feed_machine.hpp"
 #include "node/routing/other_pools.hpp"
+#include "node/tracing/span_recorder.hpp"
 #include "protocol/grammar.hpp"
 
 #include <boost/system/errc.hpp>
@@ -174,10 +175,11 @@ void peer_channel::hand_over(peer_channel& channel) {
     channel.serve_or_dial();
 }
 
-void peer_channel::reroute(const std::function<peer_channel*(std::string_view target)>& channel_to) {
+void peer_channel::reroute(
+    const std::function<peer_channel*(std::string_view target, const forwarding& by)>& channel_to) {
     for (auto next = requests_.begin(); next != requests_.end();) {
         const auto here = next++;
-        auto* const channel = (*here)->anywhere ? channel_to((*here)->request.target()) : nullptr;
+        auto* const channel = (*here)->anywhere ? channel_to((*here)->request.target(), {}) : nullptr;
         if (channel != nullptr && channel != this) {
             (*here)->owner = channel;
             channel->requests_.splice(channel->requests_.end(), requests_, here);
@@ -187,7 +189,9 @@ void peer_channel::reroute(const std::function<peer_channel*(std::string_view ta
     for (auto next = feeds_.begin(); next != feeds_.end();) {
         const auto here = next++;
         const auto& feed = *here->feed;
-        auto* const channel = feed.entry().terms.at.empty() ? channel_to(feed.target()) : nullptr;
+        const auto& terms = feed.entry().terms;
+        auto* const channel =
+            terms.at.empty() ? channel_to(feed.target(), {.via = terms.via, .requester = terms.requester}) : nullptr;
         if (channel != nullptr && channel != this) {
             here->feed->entry().at = channel->address();
             channel->feeds_.splice(channel->feeds_.end(), feeds_, here);
@@ -288,9 +292,9 @@ std::string peer_channels::tls_address_of(std::string_view node) const {
 }
 
 peer_channel* peer_channels::to(std::string_view target, std::string_view at, bool urgent,
-                                boost::system::error_code& code, std::string& why) {
-    if (!at.empty() || urgent) {
-        return find({.target = target, .at = at, .urgent = urgent}, code, why);
+                                boost::system::error_code& code, std::string& why, const forwarding& by) {
+    if (!at.empty() || urgent || !by.empty()) {
+        return find({.target = target, .at = at, .urgent = urgent, .by = by}, code, why);
     }
     if (recent_ == nullptr || recent_target_ != target) {
         recent_ = find({.target = target}, code, why);
@@ -301,19 +305,40 @@ peer_channel* peer_channels::to(std::string_view target, std::string_view at, bo
 
 std::uint64_t peer_channels::send(std::string_view target, std::string_view at, protocol::outgoing_request r,
                                   time_point deadline, detail::pending_ptr operation,
-                                  outbound::progress_function progress, std::string_view via) {
+                                  outbound::progress_function progress, const forwarding& by) {
+    if (r.carried.trace.sampled) {
+        operation = record(r, at, by, std::move(operation));
+    }
     boost::system::error_code code;
     std::string why;
-    auto* channel = via.empty() ? to(target, at, r.carried.urgent, code, why)
-                                : find({.target = target, .at = at, .urgent = r.carried.urgent, .via = via}, code, why);
+    auto* channel = to(target, at, r.carried.urgent, code, why, by);
     if (channel == nullptr) {
         host_.fail_later(std::move(operation), code, std::move(why), std::move(progress));
         return 0;
     }
     r.id = host_.draw_id();
     channel->send(r, deadline, host_.now(), std::move(operation), std::move(progress),
-                  at.empty() && via.empty() && !r.carried.urgent);
+                  at.empty() && by.empty() && !r.carried.urgent);
     return r.id;
+}
+
+detail::pending_ptr peer_channels::record(protocol::outgoing_request& r, std::string_view at, const forwarding& by,
+                                          detail::pending_ptr operation) {
+    const auto& spans = host_.node().spans;
+    if (!spans) {
+        return operation;
+    }
+    const auto next = at.empty() ? neighbour_towards(r.target(), by) : std::string{};
+    return spans->send(r, next, std::move(operation), host_.now());
+}
+
+std::string peer_channels::neighbour_towards(std::string_view target, const forwarding& by) const {
+    try {
+        auto next = place_of(target, by).node;
+        return next == target ? std::string{} : next;
+    } catch (const error&) { // it is not known
+        return {};
+    }
 }
 
 void peer_channels::send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r,
@@ -329,7 +354,7 @@ void peer_channels::send_to_node(std::string_view name, std::string_view at, pro
     channel->send(r, deadline, host_.now(), std::move(operation), {});
 }
 
-peer_channels::place peer_channels::place_of(std::string_view target, std::string_view via) const {
+peer_channels::place peer_channels::place_of(std::string_view target, const forwarding& by) const {
     const auto& own_name = host_.node().name;
     const auto& listeners = host_.listeners();
     const bool routed = host_.node().active_router != nullptr && protocol::is_reserved_target(target);
@@ -349,7 +374,7 @@ peer_channels::place peer_channels::place_of(std::string_view target, std::strin
                                          "' needs a node that routes: give this one cles::routing() as "
                                          "service_options::routing, or set call_options::at to the URL of another");
     }
-    if (auto found = discovered_place_of(target, via)) {
+    if (auto found = discovered_place_of(target, by)) {
         return std::move(*found);
     }
     const auto& discovery = host_.discovery();
@@ -366,7 +391,7 @@ peer_channels::place peer_channels::place_of(std::string_view target, std::strin
 }
 
 std::optional<peer_channels::place> peer_channels::discovered_place_of(std::string_view target,
-                                                                       std::string_view via) const {
+                                                                       const forwarding& by) const {
     const auto& peers = host_.node().peers;
     const auto known = peers.address_of(target);
     if (!known || host_.discovery().expects_more_of(target)) {
@@ -378,7 +403,7 @@ std::optional<peer_channels::place> peer_channels::discovered_place_of(std::stri
                                          ": give the URL of one");
     }
     auto* const routes = host_.node().gossip_responder;
-    auto hop = routes != nullptr ? routes->reach().next_hop_to(target, via) : std::string{target};
+    auto hop = routes != nullptr ? routes->reach().next_hop_to(target, by.via, by.requester) : std::string{target};
     const auto where = hop == target ? known : peers.address_of(hop);
     if (!where || where->empty()) {
         const auto reason =
@@ -392,13 +417,14 @@ std::optional<peer_channels::place> peer_channels::discovered_place_of(std::stri
 
 void peer_channels::on_dialled(peer_channel& channel, boost::system::error_code code) {
     auto* const routes = host_.node().gossip_responder;
-    if (routes == nullptr) {
+    // Gossip knows what it has asked, and a configured address says nothing about the one that a node announces.
+    if (routes == nullptr || host_.node().peers.address_of(channel.node()) != channel.address()) {
         return;
     }
     if (!code) {
-        routes->reach().on_opened(channel.address());
+        routes->reach().on_opened(channel.node());
     } else if (code != errc::denied && code != boost::system::errc::too_many_files_open) { // the link is not to blame
-        routes->reach().on_unreachable(channel.address(), host_.now());
+        routes->reach().on_unreachable(channel.node(), host_.now());
         reroute(channel);
     }
 }
@@ -419,21 +445,25 @@ void peer_channels::on_route_changed(std::string_view node) {
 
 void peer_channels::reroute(peer_channel& channel) {
     recent_ = nullptr;
-    channel.reroute([this](std::string_view target) {
+    channel.reroute([this](std::string_view target, const forwarding& by) {
         boost::system::error_code code;
         std::string why;
-        return find({.target = target}, code, why);
+        return find({.target = target, .by = by}, code, why);
     });
 }
 
 peer_channel* peer_channels::find(const destination& to, boost::system::error_code& code, std::string& why) {
-    const auto& [target, at, urgent, expected, via] = to;
+    const auto& [target, at, urgent, expected, by] = to;
     try {
-        auto [address, node] = at.empty() ? place_of(target, via) : place{std::string{at}, std::string{target}};
+        auto [address, node] = at.empty() ? place_of(target, by) : place{std::string{at}, std::string{target}};
         const bool waits = at.empty() && address.starts_with(undiscovered);
         const auto name = expected.empty() ? name_to_check(node, at, address) : expected;
         const auto key = address + name_suffix(name) + (urgent && !waits ? std::string{urgent_suffix} : std::string{});
+        const auto reached = at.empty() ? std::string_view{node} : expected;
         if (const auto found = channels_.find(key); found != channels_.end()) {
+            if (!reached.empty()) {
+                found->second->set_node(reached);
+            }
             return found->second.get();
         }
         const auto where = waits ? std::nullopt : std::optional{checked_url(address)};
@@ -444,6 +474,7 @@ peer_channel* peer_channels::find(const destination& to, boost::system::error_co
         }
         auto made = std::make_shared<peer_channel>(
             host_.shared_from_this(), where ? to_string(*where) : std::string{target}, where, std::string{name});
+        made->set_node(reached);
         if (waits) {
             host_.discovery().solicit(target);
         }

@@ -28,6 +28,16 @@ namespace cles::core {
 class feed_machine;
 class local_node;
 
+/// What limits the way of a request that this node forwards. Empty for its own ones.
+struct forwarding {
+    /// Nodes that have forwarded it: it does not lead through them.
+    std::string_view via{};
+    /// The member for which it is, if it is another one: nodes on the way may forward for it.
+    std::string_view requester{};
+
+    [[nodiscard]] bool empty() const noexcept { return via.empty() && requester.empty(); }
+};
+
 /// The channel to one URL: its links, opened when needed, and what waits for one.
 class peer_channel : public std::enable_shared_from_this<peer_channel> {
   public:
@@ -51,7 +61,7 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     /// Moves what waits here to another channel.
     void hand_over(peer_channel& channel);
     /// Moves what waits here for a node, and not for this address, to the channel that `channel_to` returns for it.
-    void reroute(const std::function<peer_channel*(std::string_view target)>& channel_to);
+    void reroute(const std::function<peer_channel*(std::string_view target, const forwarding& by)>& channel_to);
     /// Fails what waits here, because there is no link.
     void fail(boost::system::error_code code, std::string_view message);
     /// `c` was lost or can no longer be used.
@@ -62,6 +72,9 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     void stop();
 
     [[nodiscard]] const std::string& address() const noexcept { return address_; }
+    /// The node that was looked up by its name and is reached here; empty: only the address was given.
+    [[nodiscard]] const std::string& node() const noexcept { return node_; }
+    void set_node(std::string_view node) { node_ = node; }
     /// Whether a link is being opened.
     [[nodiscard]] bool is_opening() const noexcept { return static_cast<bool>(give_up_); }
     /// Whether it can be removed without loss.
@@ -102,6 +115,7 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     std::string address_;      // its URL, or the node
     std::optional<url> where_; // nothing: not known yet
     std::string name_;         // of the node that must answer there, if any
+    std::string node_;
     std::vector<std::shared_ptr<connection>> links_;
     waiting_requests requests_;
     std::list<waiting_feed> feeds_; // that wait for a link
@@ -119,12 +133,15 @@ class peer_channels {
     /// The channel to a target, or null with the reason in `code` and `why`. It may only hold requests for a node that
     /// is not discovered yet. Urgent requests have links of their own.
     peer_channel* to(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
-                     std::string& why);
+                     std::string& why, const forwarding& by = {});
     /// Sends a request to a target, or to `at` if it is not empty, and gives it an id. Without a channel that leads
-    /// there, the operation fails later. Returns the id, or 0. `via`: nodes that have forwarded the request.
+    /// there, the operation fails later. Returns the id, or 0.
     std::uint64_t send(std::string_view target, std::string_view at, protocol::outgoing_request r, time_point deadline,
-                       detail::pending_ptr operation, outbound::progress_function progress, std::string_view via = {});
-    /// The same at an address where only the node of that name is to answer.
+                       detail::pending_ptr operation, outbound::progress_function progress, const forwarding& by = {});
+    /// Begins the span of a traced request that is about to be sent; returns the operation that ends it.
+    [[nodiscard, gnu::cold]] detail::pending_ptr record(protocol::outgoing_request& r, std::string_view at,
+                                                        const forwarding& by, detail::pending_ptr operation);
+    /// As `send`, to an address where only the node of that name is to answer.
     void send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r, time_point deadline,
                       detail::pending_ptr operation);
     /// The address of the node has become known, unknown, or another.
@@ -161,8 +178,10 @@ class peer_channels {
         std::string address;
         std::string node;
     };
-    [[nodiscard]] place place_of(std::string_view target, std::string_view via = {}) const;
-    [[nodiscard]] std::optional<place> discovered_place_of(std::string_view target, std::string_view via) const;
+    [[nodiscard]] place place_of(std::string_view target, const forwarding& by = {}) const;
+    /// The node to which a request for the target is sent on its way there; empty if that is the target, or not known.
+    [[nodiscard]] std::string neighbour_towards(std::string_view target, const forwarding& by) const;
+    [[nodiscard]] std::optional<place> discovered_place_of(std::string_view target, const forwarding& by) const;
     url checked_url(std::string_view where) const;
     [[nodiscard]] std::string_view name_to_check(std::string_view target, std::string_view at,
                                                  std::string_view address) const;
@@ -172,7 +191,7 @@ class peer_channels {
         std::string_view at{}; ///< empty: wherever the target is
         bool urgent = false;
         std::string_view expected{}; ///< the node that must answer at `at`, if any
-        std::string_view via{};
+        forwarding by{};
     };
     void reroute(peer_channel& channel);
     peer_channel* find(const destination& to, boost::system::error_code& code, std::string& why);

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/routing/request_router.hpp"
 
+#include "node/membership/gossip.hpp"
 #include "node/routing/all_binding.hpp"
 #include "node/routing/deferred_request.hpp"
 #include "node/session/inbound.hpp"
 #include "node/session/request_checks.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <utility>
 
 namespace cles::core {
@@ -56,8 +59,7 @@ bool request_router::route(const protocol::request_line& r, const identity& peer
     } else if (target == "all") {
         begin(std::make_shared<scatter_gather>(shared_from_this(), r, peer, std::move(c), due), now);
     } else if (r.hops == 0) {
-        c->fail({.code = errc::no_target,
-                 .message = "the request cannot be forwarded to '" + std::string{target} + "': hops=0"});
+        c->fail(no_hops_left(r));
     } else {
         forward(r, requester, std::move(c), due);
     }
@@ -122,10 +124,10 @@ void request_router::bind(const protocol::request_line& r, std::string_view requ
         if (before) {
             before->close(all.get());
         }
-    } else if (r.noun.target == "any" || r.hops == 0) {
-        c->fail({.code = errc::no_target,
-                 .message = r.hops == 0 ? "the request cannot be forwarded: hops=0"
-                                        : "a binding needs a node's name or 'all'"});
+    } else if (r.noun.target == "any") {
+        c->fail({.code = errc::no_target, .message = "a binding needs a node's name or 'all'"});
+    } else if (r.hops == 0) {
+        c->fail(no_hops_left(r));
     } else {
         place.bind(r.noun.target, path, forwarded_adverbs(r, node_->name, requester), wanted, r.wants_mark, c);
     }
@@ -187,6 +189,23 @@ void request_router::on_offers() {
             all->follow();
         }
     }
+}
+
+protocol::failure request_router::no_hops_left(const protocol::request_line& r) const {
+    const auto forwarded = r.via.empty() ? 0 : std::ranges::count(r.via, ',') + 1;
+    const auto most = static_cast<std::int64_t>(protocol::max_hops);
+    auto advice = "state a greater one, at most " + std::to_string(most);
+    if (auto* const routes = node_->gossip_responder) {
+        if (const auto left = routes->reach().hops_to(r.noun.target)) {
+            const auto needed = forwarded + static_cast<std::int64_t>(*left);
+            advice = needed > most ? "no request may be forwarded more than " + std::to_string(most) + " times"
+                                   : "state hops=" + std::to_string(needed) + " (at most " + std::to_string(most) + ")";
+        }
+    }
+    return {.code = errc::no_target,
+            .message = "the request for '" + std::string{r.noun.target} + "' has been forwarded " +
+                       std::to_string(forwarded) + " times, and hops=" + std::to_string(forwarded) +
+                       " permits no more: " + advice};
 }
 
 protocol::failure request_router::no_provider(const protocol::request_line& r) const {

@@ -72,6 +72,8 @@ class request_router : public router, public std::enable_shared_from_this<reques
     }
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
     [[nodiscard]] protocol::failure no_provider(const protocol::request_line& r) const;
+    /// It has been forwarded as often as it may be.
+    [[nodiscard]] protocol::failure no_hops_left(const protocol::request_line& r) const;
 
   private:
     void on_offers();

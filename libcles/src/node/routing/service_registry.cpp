@@ -19,6 +19,8 @@ bool read_entry(json_reader& r, task_list& out) {
         return key == "verb"         ? r.read(name)
                : key == "task"       ? r.read(found.task)
                : key == "idempotent" ? r.read(found.idempotent)
+               : key == "local"      ? r.read(found.local)
+               : key == "signed"     ? r.read(found.must_be_signed)
                                      : r.skip();
     });
     if (!good) {

@@ -36,6 +36,8 @@ struct task_list {
         cles::verb verb = verb::pull;
         std::string task;
         bool idempotent = false;
+        bool local = false; ///< its jobs do not move to other nodes
+        bool must_be_signed = false;
     };
     std::vector<entry> entries;
 };

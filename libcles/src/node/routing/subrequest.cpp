@@ -4,6 +4,7 @@
 #include "node/session/reply_writer.hpp"
 #include "node/session/request_checks.hpp"
 #include "node/session/reserved_tasks.hpp"
+#include "node/tracing/span_recorder.hpp"
 
 #include <memory>
 #include <string>
@@ -107,6 +108,9 @@ void local_request::run(const protocol::request_line& r, const identity& peer, t
         write_description(w, *node_);
     } else if (r.noun.path == "cles/metrics") {
         write_metrics(w, *node_);
+    } else if (const auto id = protocol::parse_trace_id(is_spans_request(r) ? r.noun.parameters[1] : "");
+               id && node_->spans) {
+        node_->spans->write(w, *id, now);
     } else {
         fail(no_such_task(*node_, r), false);
         return;

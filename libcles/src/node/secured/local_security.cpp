@@ -2,6 +2,7 @@
 #include "node/secured/local_security.hpp"
 
 #include "node/local_node.hpp"
+#include "node/membership/gossip.hpp"
 #include "node/secured/roster_exchange.hpp"
 #include "protocol/request_line.hpp"
 
@@ -32,6 +33,9 @@ void local_security::apply_change() {
     }
     host_.connections().on_security_changed();
     host_.feeds().on_security_changed();
+    if (auto* const routes = node.gossip_responder) {
+        routes->reach().on_rights_changed();
+    }
     host_.discovery().expedite_announcement();
 }
 

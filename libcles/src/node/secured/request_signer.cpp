@@ -27,7 +27,8 @@ struct repeatable_request {
     std::string path;
     std::string body;
     std::string at;
-    bool urgent = false;
+    protocol::carried_adverbs carried{};
+    std::uint32_t hops = protocol::default_hops;
     outbound::progress_function progress;
     time_point deadline{};
     std::uint64_t ticket = 0;
@@ -75,7 +76,7 @@ void send_signed(local_node& host, request_signer& by, const repeatable_request&
     host.flush_scheduler().run_user_call([&] {
         const auto id = host.peer_channels().send(
             node, r.at,
-            {.verb = r.how, .noun = noun, .carried = {.urgent = r.urgent}, .adverbs = adverbs, .body = r.body},
+            {.verb = r.how, .noun = noun, .carried = r.carried, .hops = r.hops, .adverbs = adverbs, .body = r.body},
             r.deadline, std::move(reply), std::move(progress));
         if (id != 0) {
             by.note(r.ticket, id);
@@ -337,7 +338,8 @@ detail::pending_ptr request_signer::watch(const outgoing_call& r, detail::pendin
                                                   .path = std::string{r.noun.path},
                                                   .body = std::string{protocol::trim(r.body)},
                                                   .at = r.options.at_,
-                                                  .urgent = r.options.urgent_,
+                                                  .carried = r.carried,
+                                                  .hops = r.options.hops_,
                                                   .progress = r.options.on_progress_,
                                                   .deadline = r.deadline,
                                                   .ticket = r.ticket},

@@ -3,6 +3,7 @@
 
 #include "node/session/handler_failure.hpp"
 #include "node/session/request_checks.hpp"
+#include "node/tracing/span_recorder.hpp"
 
 #include <algorithm>
 #include <exception>
@@ -63,7 +64,9 @@ void call::fail(protocol::failure why) {
         why = after_run(std::move(why));
         if (!terms_.grantee.empty()) { // its sender takes any failure that does not say so for a refusal
             why.ran = why.code != errc::busy || why.ran;
-            node_->counts.jobs_moved_in -= why.ran ? 0 : 1;
+        }
+        if (!why.ran) {
+            terms_.grantee.clear(); // it goes back
         }
     }
     end().refuse(*this, why);
@@ -80,7 +83,11 @@ task_sink& call::end() {
     auto& owner = *owner_;
     detach();
     if (!terms_.routed) { // that time is other nodes'
-        node_->handler_time.record(node_->time.now() - started_);
+        const auto took = node_->time.now() - started_;
+        node_->handler_time.record(took);
+        if (terms_.trace.sampled && !times_recorded_) {
+            record_times({}, took);
+        }
     }
     return owner;
 }
@@ -103,8 +110,16 @@ bool call::progress(double fraction, std::string_view json) {
     return owner_->report(*this, reported_, json);
 }
 
+void call::record_times(std::chrono::nanoseconds queued, std::chrono::nanoseconds ran) {
+    times_recorded_ = true;
+    if (terms_.trace.sampled && node_->spans) {
+        node_->spans->add_times(terms_.trace.span, queued, ran);
+    }
+}
+
 void call::write_log(log_level level, std::string_view text) const {
-    node_->write_log(level, {text, owner_ != nullptr ? owner_->peer_address() : std::string_view{}, terms_.id});
+    const auto trace = terms_.trace ? protocol::trace_id_text(terms_.trace.id) : std::string{};
+    node_->write_log(level, {text, owner_ != nullptr ? owner_->peer_address() : std::string_view{}, terms_.id, trace});
 }
 
 void call::on_stop(std::function<void()> callback) {
@@ -116,6 +131,7 @@ void call::on_stop(std::function<void()> callback) {
 }
 
 void call::detach() noexcept {
+    node_->counts.jobs_moved_in += owner_ != nullptr && !terms_.grantee.empty() ? 1 : 0;
     owner_ = nullptr;
     node_->deadlines.disarm(*this);
 }

@@ -11,6 +11,7 @@
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -32,15 +33,14 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
         /// Those that the request line states.
         explicit terms(const protocol::request_line& r)
             : carried_adverbs(r.carried()), verb(r.verb), id(r.id), wants_reply(r.wants_reply),
-              wants_progress(r.wants_progress),
-              grantee(r.grant != 0 ? protocol::last_in_via(r.via) : std::string_view{}) {}
+              wants_progress(r.wants_progress) {}
 
         cles::verb verb;
         std::uint64_t id;
         bool wants_reply;
         bool wants_progress;
         bool routed = false;      ///< other nodes serve it
-        std::string grantee{};    ///< the node that has forwarded it on a grant of this one; empty: none
+        std::string grantee{};    ///< the node that has forwarded it on a valid grant of this one; empty: none
         std::string publish_path; ///< path of a request to publish; else empty
         std::string publish_body;
     };
@@ -67,6 +67,8 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     void on_stop(std::function<void()> callback);
     /// Removes and returns the `on_stop` callback.
     std::function<void()> forget_on_stop() noexcept { return std::exchange(on_stop_, nullptr); }
+    /// For `responder::record_times`.
+    void record_times(std::chrono::nanoseconds queued, std::chrono::nanoseconds ran);
     /// Logs a handler's message with the request's id and, until the call ends, the peer's address.
     [[gnu::cold]] void write_log(log_level level, std::string_view text) const;
     /// Reserves this much more memory until the handler releases the call. False if there is none.
@@ -112,6 +114,7 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     std::function<void()> on_stop_;
     std::unique_ptr<const movable_request> movable_;
     bool stopped_ = false;
+    bool times_recorded_ = false;
 };
 
 /// Whether the handler may have run: `busy` without `ran` promises that it has not.

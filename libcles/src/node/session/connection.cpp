@@ -63,7 +63,12 @@ void connection::on_line(std::string_view line) {
     if (!accept_input(line)) {
         return;
     }
-    session_.on_line(line, now());
+    if (host_->node().active_router == nullptr) {
+        session_.on_line(line, now());
+    } else { // it may be forwarded
+        host_->flush_scheduler().run_line([&] { session_.on_line(line, now()); },
+                                          [this] { return !gone_ && link_->unsent() == 0; });
+    }
     // In a long batch, the first replies leave early: with many requests in flight, neither end then waits for the
     // other.
     if (++lines_ % lines_per_write == 0 || link_->output().size() > host_->bounds().unread) {

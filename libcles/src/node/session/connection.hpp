@@ -72,6 +72,9 @@ class connection final : public link_events,
     void flush() override;
     [[nodiscard]] bool write() override;
     [[nodiscard]] bool has_single_request() override { return session_.asking().in_flight() <= 1; }
+    [[nodiscard]] bool has_single_message() override {
+        return has_single_request() && session_.serving().in_flight() == 0;
+    }
     [[nodiscard]] std::shared_ptr<flushable> share() override { return shared_from_this(); }
 
     // line_sink

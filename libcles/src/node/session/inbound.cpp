@@ -5,6 +5,7 @@
 #include "node/security_protocol.hpp"
 #include "node/session/request_checks.hpp"
 #include "node/session/reserved_tasks.hpp"
+#include "node/tracing/span_recorder.hpp"
 
 #include <utility>
 #include <vector>
@@ -101,11 +102,17 @@ void inbound::lose() {
     }
     auto calls = std::exchange(calls_, {});
     const auto anonymous = ordered_.clear();
+    const auto detach = [this](call& c) {
+        c.detach();
+        if (const auto& trace = c.wanted().trace; trace.sampled && node_->spans) {
+            node_->spans->end(trace.span, wire_name(errc::cancelled), node_->time.now());
+        }
+    };
     for (auto& [id, c] : calls) {
-        c->detach();
+        detach(*c);
     }
     if (anonymous) {
-        anonymous->detach();
+        detach(*anonymous);
     }
     bound_.clear();
     if (anonymous) {
@@ -163,6 +170,21 @@ void inbound::serve_more(time_point now) {
 // -- serving -------------------------------------------------------------------------------------------------------
 
 void inbound::serve(const protocol::request_line& r, time_point arrived, time_point now) {
+    if (r.trace.sampled && node_->spans) {
+        serve_traced(r, arrived, now);
+    } else {
+        serve_admitted(r, arrived, now);
+    }
+}
+
+// From here on, the request's parent is the span of this node.
+void inbound::serve_traced(const protocol::request_line& r, time_point arrived, time_point now) {
+    auto traced = r;
+    traced.trace = node_->spans->receive(r, arrived, now);
+    serve_admitted(traced, arrived, now);
+}
+
+void inbound::serve_admitted(const protocol::request_line& r, time_point arrived, time_point now) {
     const auto due = saturating_add(arrived, std::chrono::milliseconds{r.deadline_ms});
     if (now >= due) {
         replies_.fail(r, errc::deadline, node_->name + ": the deadline passed while the request was queued");

@@ -69,6 +69,8 @@ class inbound final : private task_sink {
     static constexpr std::size_t max_frame = 64; // around a reply: "id=7 " and the closing characters
 
     void serve(const protocol::request_line& request, time_point arrived, time_point now);
+    [[gnu::cold]] void serve_traced(const protocol::request_line& request, time_point arrived, time_point now);
+    void serve_admitted(const protocol::request_line& request, time_point arrived, time_point now);
     [[gnu::cold]] void serve_cancel(const protocol::request_line& request, std::uint64_t id);
     void serve_locally(const protocol::request_line& request, time_point due, time_point now);
     void keep(const protocol::request_line& request, const std::shared_ptr<call>& c);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/outbound.hpp"
 
+#include "node/session/request_checks.hpp"
+
 #include <algorithm>
 #include <utility>
 
@@ -210,8 +212,13 @@ void outbound::on_reply(const protocol::reply_line& reply) {
 }
 
 void outbound::on_overlong(const protocol::reply_line& reply) {
-    fail(reply.id - first_id_, errc::too_large,
-         "the answer is longer than " + std::to_string(node_.bounds.line) + " bytes");
+    if (const auto e = take(reply.id - first_id_)) {
+        const protocol::failure why{.code = errc::too_large,
+                                    .message =
+                                        "the answer is longer than " + std::to_string(node_.bounds.line) + " bytes",
+                                    .ran = true};
+        node_.completions.refuse(std::move(e->operation), why, failure_text(why), std::move(e->progress));
+    }
 }
 
 void outbound::refuse(const std::string& answer) {

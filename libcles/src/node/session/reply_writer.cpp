@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/reply_writer.hpp"
 
+#include "node/tracing/span_recorder.hpp"
+
 #include <algorithm>
 
 namespace cles::core {
@@ -8,7 +10,8 @@ namespace {
 
 constexpr std::size_t max_escape = 6;     // "\u0000"
 constexpr std::size_t always_fits = 1024; // a failure in its place would take about as much
-constexpr std::size_t head_bytes = 24;    // times max_escape: the bytes around a failure's message
+constexpr std::string_view done_outcome = "ok";
+constexpr std::size_t head_bytes = 24; // times max_escape: the bytes around a failure's message
 
 // Truncates text without splitting a character.
 void cut(std::string& text, std::size_t longest) {
@@ -34,7 +37,10 @@ reply_writer::reply_writer(node_state& host, line_sink& out) noexcept
     : node_(host), out_(out),
       max_reply_(out.datagram() == 0 ? host.bounds.line : std::min(host.bounds.line, out.datagram() - 1)) {}
 
-void reply_writer::note(reply_target where, std::string_view reply) {
+void reply_writer::note(reply_target where, std::string_view reply, std::string_view outcome) {
+    if (where.span != 0 && node_.spans) {
+        node_.spans->end(where.span, outcome, node_.time.now());
+    }
     if (seen_ != nullptr && where.id != 0 && !where.apart && !seen_->empty()) {
         seen_->set_reply(where.id, reply, node_.time.now());
     }
@@ -69,16 +75,16 @@ void reply_writer::send(reply_target where, std::string& text, std::size_t body)
     } else if (where.wanted) {
         text.push_back('\n');
         output_for(where).append(text);
-        note(where, text);
+        note(where, text, done_outcome);
     } else {
-        note(where, {});
+        note(where, {}, done_outcome);
     }
 }
 
 void reply_writer::fail(reply_target where, const protocol::failure& why) {
     if (!where.wanted) {
         ++(where.housekeeping ? node_.counts.housekeeping_errors : node_.counts.errors_unsent);
-        note(where, {});
+        note(where, {}, wire_name(why.code));
         return;
     }
     ++(where.housekeeping ? node_.counts.housekeeping_errors : node_.counts.errors);
@@ -99,7 +105,7 @@ void reply_writer::fail(reply_target where, const protocol::failure& why) {
         protocol::append_failure(out, reported);
     }
     out.push_back('\n');
-    note(where, std::string_view{out}.substr(line));
+    note(where, std::string_view{out}.substr(line), wire_name(why.code));
 }
 
 void reply_writer::progress(reply_target where, double fraction, std::string_view json) {

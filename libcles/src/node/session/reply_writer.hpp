@@ -30,12 +30,13 @@ inline void close_body(std::string& out, std::size_t start) {
 /// The same for a result. Returns why it cannot be one, or nothing: as a reply it would be read as a failure.
 [[nodiscard]] std::optional<protocol::failure> close_result(std::string& out, std::size_t start);
 
-/// Whether nodes send this request to each other on their own, for membership and task discovery: `cles` and
-/// `cles/peers`. It is counted separately from the requests of programs.
+/// Whether nodes send this request to each other on their own, for membership, task discovery and sharing: `cles`,
+/// `cles/peers` and `cles/slots`. It is counted separately from the requests of programs.
 inline bool is_housekeeping(const protocol::request_line& r) noexcept {
     const auto& noun = r.noun;
     return noun.task == "cles" &&
-           (noun.parameters.empty() || (noun.parameters.size() == 1 && noun.parameters[0] == "peers"));
+           (noun.parameters.empty() ||
+            (noun.parameters.size() == 1 && (noun.parameters[0] == "peers" || noun.parameters[0] == "slots")));
 }
 
 /// The request that a reply is for, and how the reply is sent.
@@ -44,21 +45,23 @@ struct reply_target {
     bool wanted = true;
     bool urgent = false;
     bool housekeeping = false;
-    bool reserved = false; ///< for the task `cles`, which is answered even without free memory
-    bool apart = false;    ///< not the reply to the request in flight with that id
+    bool reserved = false;  ///< for the task `cles`, which is answered even without free memory
+    bool apart = false;     ///< not the reply to the request in flight with that id
+    std::uint64_t span = 0; ///< of a traced request, which ends with the reply
 
-    explicit reply_target(const call::terms& r) noexcept : reply_target(r.id, r.wants_reply, r.urgent) {}
-    explicit reply_target(const protocol::request_line& r) noexcept : reply_target(r.id, r.wants_reply, r.urgent) {
+    explicit reply_target(const call::terms& r) noexcept : reply_target(r.id, r.wants_reply, r.carried()) {}
+    explicit reply_target(const protocol::request_line& r) noexcept : reply_target(r.id, r.wants_reply, r.carried()) {
         housekeeping = is_housekeeping(r);
         reserved = r.noun.task == "cles";
     }
-    explicit reply_target(const protocol::malformed_request& r) noexcept : reply_target(r.id, r.wants_reply, false) {
+    explicit reply_target(const protocol::malformed_request& r) noexcept : reply_target(r.id, r.wants_reply, {}) {
         apart = true;
     }
 
   private:
-    reply_target(std::uint64_t of, bool reply_wanted, bool is_urgent) noexcept
-        : id(of), wanted(reply_wanted), urgent(is_urgent && of != 0) {} // without an id, order matters
+    reply_target(std::uint64_t of, bool reply_wanted, const protocol::carried_adverbs& r) noexcept
+        : id(of), wanted(reply_wanted), urgent(r.urgent && of != 0), // without an id, order matters
+          span(r.trace.sampled ? r.trace.span : 0) {}
 };
 
 /// Writes the replies of one link: a handler's result, or the failure that replaces it.
@@ -104,7 +107,7 @@ class reply_writer {
         return where.urgent ? out_.urgent_output() : out_.output();
     }
     void send(reply_target where, std::string& text, std::size_t body);
-    void note(reply_target where, std::string_view reply);
+    void note(reply_target where, std::string_view reply, std::string_view outcome);
 
     node_state& node_;
     line_sink& out_;

@@ -84,15 +84,19 @@ bool allows(const node_state& n, const identity& peer, const protocol::request_l
     if (!n.authorise) {
         return true;
     }
+    const auto log_error = [&](std::string_view why) {
+        const auto trace = r.trace ? protocol::trace_id_text(r.trace.id) : std::string{};
+        n.write_log(log_level::error, {why, peer.address, r.id, trace});
+    };
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);
     try {
         return n.authorise({peer, r.verb, r.noun.task, path});
     } catch (const std::exception& thrown) {
         const auto why = std::string{"denied, because the access rules threw an exception: "} + thrown.what();
-        n.write_log(log_level::error, {why, peer.address, r.id});
+        log_error(why);
     } catch (...) {
-        n.write_log(log_level::error, {"denied, because the access rules threw an exception", peer.address, r.id});
+        log_error("denied, because the access rules threw an exception");
     }
     return false; // rules that throw deny access
 }

@@ -11,6 +11,7 @@
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/security_protocol.hpp"
 #include "node/sharing/movable_request.hpp"
+#include "node/tracing/span_recorder.hpp"
 #include "port/node_security.hpp"
 
 #include <array>
@@ -87,6 +88,11 @@ void serve_peers(node_state& host, reply_writer& replies, const protocol::reques
 
 } // namespace
 
+bool is_spans_request(const protocol::request_line& r) noexcept {
+    const auto& parameters = r.noun.parameters;
+    return r.verb == verb::pull && parameters.size() == 2 && parameters[0] == "trace";
+}
+
 void write_tasks(json_writer& w, const node_state& n) {
     w.begin_array();
     for (const auto& [task, handlers] : n.tasks.tasks()) {
@@ -114,7 +120,11 @@ void write_description(json_writer& w, const node_state& n) {
     }
     write_member(w, "version", std::string_view{version});
     write_member(w, "protocol", std::int64_t{1});
-    write_member(w, "features", std::vector<std::string>{"mark"}); // additions to the first version that it understands
+    std::vector<std::string> features{"mark"}; // additions to the first version that it understands
+    if (n.spans) {
+        features.emplace_back("trace");
+    }
+    write_member(w, "features", features);
     write_member(w, "epoch", std::string_view{n.epoch});
     write_member(w, "uptime_ms", milliseconds_since(n.started, n.time.now()));
     write_member(w, "endpoints", n.endpoints);
@@ -188,6 +198,12 @@ void serve_reserved(node_state& host, reply_writer& replies, const protocol::req
         }
     } else if (r.verb == verb::push && parameters.size() == 1 && parameters[0] == "slots" && host.sharing != nullptr) {
         host.sharing->serve_slots(replies, r, peer, host.time.now());
+    } else if (host.spans && is_spans_request(r)) {
+        if (const auto id = protocol::parse_trace_id(parameters[1])) {
+            replies.write(r, [&](json_writer& w) { host.spans->write(w, *id, host.time.now()); });
+        } else {
+            replies.fail(r, errc::bad_request, host.name + ": a trace is named by 32 lower-case hex digits, not all 0");
+        }
     } else if (host.secured && host.secured->serve_reserved(replies, r)) {
         return;
     } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {

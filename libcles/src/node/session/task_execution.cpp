@@ -8,6 +8,7 @@
 #include "node/session/handler_failure.hpp"
 #include "node/session/request_checks.hpp"
 #include "node/sharing/movable_request.hpp"
+#include "node/tracing/span_recorder.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -87,21 +88,27 @@ bool task_registry::can_bind(std::string_view task) const noexcept {
 
 namespace {
 
-/// Measures the time of every 16th plain handler.
+/// Measures the time of every 16th plain handler, and of those of traced requests.
 class sampled_time {
   public:
-    explicit sampled_time(node_state& host) noexcept
-        : node_(host), runs_(host.plain_runs++ % 16 == 0), before_(runs_ ? host.time.now() : time_point{}) {}
+    sampled_time(node_state& host, const protocol::trace_context& trace) noexcept
+        : node_(host), span_(trace.sampled && host.spans ? trace.span : 0),
+          runs_(host.plain_runs++ % 16 == 0 || span_ != 0), before_(runs_ ? host.time.now() : time_point{}) {}
     sampled_time(const sampled_time&) = delete;
     sampled_time& operator=(const sampled_time&) = delete;
     ~sampled_time() {
         if (runs_) {
-            node_.handler_time.record(node_.time.now() - before_);
+            const auto took = node_.time.now() - before_;
+            node_.handler_time.record(took);
+            if (span_ != 0) {
+                node_.spans->add_times(span_, {}, took);
+            }
         }
     }
 
   private:
     node_state& node_;
+    std::uint64_t span_; // 0: not traced
     bool runs_;
     time_point before_;
 };
@@ -127,13 +134,16 @@ decoded_parameters decode(const protocol::noun_view& noun, std::string& storage)
 task_execution::task_execution(const std::shared_ptr<node_state>& host, const protocol::request_line& line,
                                const identity& peer, time_point due, time_point now, std::string& decoded)
     : node_(host), line_(line), due_(due), now_(now), handler_(host->tasks.find(line.verb, line.noun.task)),
-      parameters_(decode(line.noun, decoded)), data_{.verb = line.verb,
-                                                     .node = host->name,
-                                                     .task = line.noun.task,
-                                                     .parameters = {parameters_.data(), parameters_.size()},
-                                                     .body = line.body.empty() ? std::string_view{"{}"} : line.body,
-                                                     .peer = &peer,
-                                                     .deadline = due},
+      parameters_(decode(line.noun, decoded)),
+      trace_(line.trace ? protocol::traceparent_text(line.trace) : std::string{}),
+      data_{.verb = line.verb,
+            .node = host->name,
+            .task = line.noun.task,
+            .parameters = {parameters_.data(), parameters_.size()},
+            .body = line.body.empty() ? std::string_view{"{}"} : line.body,
+            .peer = &peer,
+            .deadline = due,
+            .trace = trace_},
       request_(data_) {}
 
 void task_execution::run(task_sink& to, const std::shared_ptr<memory_account>& memory) {
@@ -145,10 +155,12 @@ void task_execution::run(task_sink& to, const std::shared_ptr<memory_account>& m
     if (!why) {
         try {
             to.write_result(*this);
+            node_->counts.jobs_moved_in += granted_ ? 1 : 0;
             return;
         } catch (...) {
             why = after_run(describe(std::current_exception()));
-            why->ran = why->ran || (line_.grant != 0 && why->code != errc::busy);
+            why->ran = why->ran || (granted_ && why->code != errc::busy);
+            node_->counts.jobs_moved_in += granted_ && why->ran ? 1 : 0;
         }
     }
     to.refuse(*this, *why);
@@ -184,8 +196,8 @@ std::optional<protocol::failure> task_execution::grant_refusal() {
     if (node_->sharing == nullptr) {
         return protocol::failure{.code = errc::denied, .message = node_->name + " does not share work"};
     }
-    auto why = node_->sharing->use_grant(line_, *data_.peer, now_);
-    node_->counts.jobs_moved_in += why ? 0 : 1;
+    auto why = node_->sharing->use_grant(line_, handler_->info, *data_.peer, now_);
+    granted_ = !why;
     return why;
 }
 
@@ -199,7 +211,7 @@ std::optional<protocol::failure> task_execution::signature_refusal() {
 }
 
 void task_execution::write(json_writer& w) {
-    const sampled_time during{*node_};
+    const sampled_time during{*node_, line_.trace};
     started_ = true;
     handler_->plain(request_, w);
     if (line_.verb == verb::update) {
@@ -211,6 +223,9 @@ void task_execution::write(json_writer& w) {
 
 void task_execution::start(task_sink& to, const std::shared_ptr<memory_account>& memory) {
     call::terms wanted{line_};
+    if (granted_) {
+        wanted.grantee = protocol::last_in_via(line_.via);
+    }
     if (line_.verb == verb::update) {
         wanted.publish_path = publish_path();
         append_compact_json(request_.body(), wanted.publish_body);

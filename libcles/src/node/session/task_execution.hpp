@@ -144,10 +144,12 @@ class task_execution {
     const time_point now_;
     const handler* handler_; // null: not found
     decoded_parameters parameters_;
+    const std::string trace_; // empty: none
     const detail::request_data data_;
     const request request_;
     std::string path_;
     bool started_ = false;
+    bool granted_ = false; // it has used a slot of a grant of this node
 };
 
 } // namespace cles::core

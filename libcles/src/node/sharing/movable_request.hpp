@@ -3,10 +3,12 @@
 
 #include <cles/identity.hpp>
 #include <cles/limits.hpp>
+#include <cles/task_info.hpp>
 
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,6 +24,7 @@ struct movable_request {
     std::string adverbs;   ///< as forwarded
     std::string via;       ///< the nodes that have forwarded it
     std::string requester; ///< in a secured fleet, whose rights apply
+    std::size_t size = 0;  ///< of its line
 };
 
 /// What a node that shares work does with requests. An interface, so that a program that does not share does not link
@@ -34,10 +37,10 @@ class request_sharing {
 
     /// What is needed to forward the request; null if it is not moved to other nodes.
     [[nodiscard]] virtual std::unique_ptr<const movable_request> movable(const protocol::request_line& r,
-                                                                         const identity& peer) const = 0;
-    /// Uses a slot of the grant on which the request came. Returns why it cannot.
-    [[nodiscard]] virtual std::optional<protocol::failure> use_grant(const protocol::request_line& r,
-                                                                     const identity& peer, time_point now) = 0;
+                                                                         const identity& peer) = 0;
+    /// Uses a slot of the grant on which the request for that task came. Returns why it cannot.
+    [[nodiscard]] virtual std::optional<protocol::failure>
+    use_grant(const protocol::request_line& r, const task_info& task, const identity& peer, time_point now) = 0;
     /// The adverb of a reply to that node with which it gets another slot; empty: it gets none.
     [[nodiscard]] virtual std::string grant_another(std::string_view to) = 0;
     /// Serves `PUSH self:cles/slots`.

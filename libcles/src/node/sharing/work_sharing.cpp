@@ -28,6 +28,8 @@ void smooth(std::optional<microseconds>& average, microseconds sample) {
 
 microseconds elapsed(time_point since, time_point now) { return std::chrono::duration_cast<microseconds>(now - since); }
 
+std::string_view task_of(const movable_request& r) { return std::string_view{r.path}.substr(0, r.path.find('/')); }
+
 std::uint32_t bounded(std::uint64_t count) {
     return static_cast<std::uint32_t>(std::min<std::uint64_t>(count, std::numeric_limits<std::uint32_t>::max()));
 }
@@ -59,57 +61,101 @@ void work_sharing::withdraw_all() {
 
 // -- requests ------------------------------------------------------------------------------------------------------
 
-std::unique_ptr<const movable_request> work_sharing::movable(const protocol::request_line& r,
-                                                             const identity& peer) const {
-    const auto* task = r.verb == verb::delegate && r.hops != 0 ? node_.tasks.find(r.verb, r.noun.task) : nullptr;
+// A job that came on a grant stays: it moves once.
+std::unique_ptr<const movable_request> work_sharing::movable(const protocol::request_line& r, const identity& peer) {
+    const bool may = r.verb == verb::delegate && r.hops != 0 && r.grant == 0 && r.text.size() <= longest_moved;
+    const auto* task = may ? node_.tasks.find(r.verb, r.noun.task) : nullptr;
     if (task == nullptr || task->info.local || task->info.must_be_signed) {
         return nullptr;
     }
     const auto requester = requester_of(node_, peer, r);
-    if (!requester.empty() && requester != node_.name && !node_.security->may_forward(node_.name, requester)) {
+    if (!may_forward_for(requester)) {
         return nullptr;
     }
     auto last = r;
     last.hops = 1; // so that it is forwarded with `hops=0`
+    auto adverbs = forwarded_adverbs(last, node_.name, requester);
+    constexpr std::ptrdiff_t others = 5; // id, deadline, progress, urgent, grant
+    if (std::count(adverbs.begin(), adverbs.end(), ' ') + 1 + others > std::ptrdiff_t{protocol::max_adverbs}) {
+        return nullptr;
+    }
     std::string scratch;
     return std::make_unique<const movable_request>(
         movable_request{.path = std::string{protocol::canonical_path(r.noun, scratch)},
-                        .adverbs = forwarded_adverbs(last, node_.name, requester),
+                        .adverbs = std::move(adverbs),
                         .via = std::string{r.via},
-                        .requester = std::string{requester}});
+                        .requester = std::string{requester},
+                        .size = r.text.size()});
 }
 
-std::optional<protocol::failure> work_sharing::use_grant(const protocol::request_line& r, const identity& peer,
-                                                         time_point now) {
+bool work_sharing::may_forward_for(std::string_view requester) {
+    if (requester.empty() || requester == node_.name || node_.security->may_forward(node_.name, requester)) {
+        return true;
+    }
+    const auto* const others = out_.registry();
+    if (!has_logged_why_ && others != nullptr && !others->nodes().empty()) {
+        has_logged_why_ = true;
+        const std::string who{requester};
+        node_.post_log(log_level::info, "jobs of " + who + " do not move to other nodes, because " + node_.name +
+                                            " may not forward for it (cles fleet rights " + node_.name +
+                                            " --forwards " + who + ")");
+    }
+    return false;
+}
+
+bool work_sharing::may_move(const call& job) const noexcept { return job.movable() != nullptr; }
+
+std::optional<protocol::failure> work_sharing::use_grant(const protocol::request_line& r, const task_info& task,
+                                                         const identity& peer, time_point now) {
     const auto by = protocol::last_in_via(r.via);
-    const auto refused = [&](errc code, const char* why) {
-        ++node_.counts.grants_refused;
-        return protocol::failure{.code = code, .message = node_.name + ": " + why};
+    const auto refused = [&](errc code, const std::string& why) {
+        ++node_.counts.granted_jobs_refused;
+        return protocol::failure{.code = code, .message = node_.name + " " + why};
+    };
+    // The sender's next grant may come at once.
+    const auto busy = [&](const std::string& why) {
+        auto failure = refused(errc::busy, why);
+        failure.retry_ms = 1;
+        return failure;
     };
     if (node_.security && by != peer.name) {
-        return refused(errc::denied, "this grant is not that of the peer");
+        return refused(errc::denied, "has not granted this: the last node in 'via' is not the peer");
+    }
+    if (task.local) {
+        return refused(errc::no_task, "takes no jobs of '" + std::string{r.noun.task} + "' from other nodes");
+    }
+    if (task.must_be_signed) {
+        return refused(errc::denied,
+                       "takes no jobs of '" + std::string{r.noun.task} + "' from other nodes: they are signed");
     }
     switch (granted_.check(by, r.grant, now)) {
-    case slot_grants::verdict::unknown: return refused(errc::denied, "it has not granted this");
-    case slot_grants::verdict::over: return refused(errc::busy, "the grant is not valid any more");
+    case slot_grants::verdict::unknown:
+        return refused(errc::denied, "has not granted " + protocol::grant_text(r.grant) + " to " +
+                                         (by.empty() ? "the sender, which is not in 'via'" : std::string{by}));
+    case slot_grants::verdict::over: return busy("has no slot left for this: the grant has expired, or is used up");
     case slot_grants::verdict::valid: break;
     }
     if (jobs_.read_state().free() == 0) {
-        return refused(errc::busy, "other jobs have taken the granted slots");
+        return busy("has no free worker any more");
     }
     granted_.use(by);
     return std::nullopt;
 }
 
-// The slot of a job that is being answered, unless jobs wait here. So a stream of jobs needs no other messages.
+// The slot of a job that is being answered, unless jobs wait here, or more jobs at another node than there. So a stream
+// of jobs needs no other messages.
 std::string work_sharing::grant_another(std::string_view to) {
-    if (jobs_.read_state().waiting != 0) {
+    const auto now = node_.time.now();
+    if (const auto own = jobs_.read_state(); own.waiting != 0 || own.workers == 0 || own.draining) {
         return {};
     }
     auto& other = known_[std::string{to}];
+    if (const auto* first = most_loaded(now); first != nullptr && known_.find(*first)->second.waiting > other.waiting) {
+        return {};
+    }
     const bool has_more = other.waiting != 0; // then it will use the slot at once
     other.waiting -= has_more ? 1 : 0;
-    return "grant=" + protocol::grant_text(open_grant(to, 1, has_more ? 1 : 0, node_.time.now()));
+    return "grant=" + protocol::grant_text(open_grant(to, 1, has_more ? 1 : 0, now));
 }
 
 bool work_sharing::read(std::string_view body, std::size_t depth, slots_message& to) {
@@ -132,8 +178,8 @@ std::optional<protocol::failure> work_sharing::refusal(const slots_message& said
     if (node_.security && said.node != peer.name) {
         return refused(errc::denied, "'node' is not the peer");
     }
-    if (!node_.peers.address_of(said.node)) {
-        return refused(errc::bad_request, "'node' is not a node that is known here");
+    if (find_neighbour(said.node) == nullptr) {
+        return refused(errc::bad_request, "'node' is not a node to which this one has a link by a stream");
     }
     if (r.grant != 0 && (said.free == 0 || said.free > slot_grants::max_slots)) {
         return refused(errc::bad_request, "a grant is for 1 to 1024 jobs ('free')");
@@ -145,15 +191,16 @@ void work_sharing::serve_slots(reply_writer& replies, const protocol::request_li
                                time_point now) {
     slots_message said;
     if (!read(r.body, node_.bounds.depth, said)) {
-        replies.fail(r, errc::bad_request, node_.name + ": the body is not about slots");
+        replies.fail(r, errc::bad_request, node_.name + ": the body needs 'node', and 'free' or 'waiting'");
         return;
     }
     if (const auto why = refusal(said, r, peer)) {
         replies.fail(r, *why);
         return;
     }
+    auto& other = known_[std::string{said.node}];
+    other.silent_until = time_point::min();
     if (r.grant == 0) {
-        auto& other = known_[std::string{said.node}];
         other.waiting = bounded(said.waiting);
         other.heard = now;
         replies.done(reply_target{r}, {});
@@ -162,9 +209,10 @@ void work_sharing::serve_slots(reply_writer& replies, const protocol::request_li
     }
     ++node_.counts.grants_received;
     auto& held = hold(said.node, r.grant, bounded(said.free), now);
-    held.work = microseconds{bounded(said.service_us)};
+    other.service_time = microseconds{bounded(said.service_us)};
     const auto taken = forward_jobs(std::string{said.node}, held, now);
-    const auto waiting = jobs_.read_state().excess();
+    const bool may_have_more = taken != 0 && held.left == 0;
+    const auto waiting = may_have_more ? jobs_.read_state().excess() : 0;
     replies.done(reply_target{r}, object([&](json_writer& w) {
                      write_member(w, "taken", std::uint64_t{taken});
                      write_member(w, "waiting", std::uint64_t{waiting});
@@ -199,25 +247,27 @@ class work_sharing::moved_reply final : public subrequest {
 /// Chooses the jobs to forward on one grant, and forwards them.
 class work_sharing::forwarding final : public job_taker {
   public:
-    forwarding(work_sharing& by, const std::string& node, const held_grant& grant, time_point now)
-        : by_(by), node_(node), grant_(grant), now_(now), own_(by.jobs_.read_state()) {
-        const auto slower = std::max(grant.work - own_.service_time, microseconds{0});
-        const std::chrono::duration<double, std::micro> transfer{by.transfer_to(node_)};
-        required_wait_ = worth * transfer + slower;
+    forwarding(work_sharing& by, const std::string& node, const held_grant& grant, const shareable_queue::state& own,
+               time_point now)
+        : by_(by), node_(node), other_(by.known_[node]), grant_(grant), now_(now), own_(own) {
+        const auto slower = std::max(other_.service_time - own_.service_time, microseconds{0});
+        const std::chrono::duration<double, std::micro> transfer{other_.transfer(now)};
+        required_wait_ = min_wait_per_transfer * transfer + slower;
     }
 
-    [[nodiscard]] bool full() const noexcept override { return wanted_ == grant_.left; }
+    [[nodiscard]] bool full() const noexcept override { return chosen_ == grant_.left; }
 
-    bool wants(const call& job, std::size_t ahead) override {
-        if (job.ended() || job.movable() == nullptr || !is_worth_it(ahead)) {
+    bool choose(const call& job, std::size_t ahead) override {
+        if (job.ended() || job.movable() == nullptr) {
             return false;
         }
-        const auto& r = *job.movable();
-        const auto task = std::string_view{r.path}.substr(0, r.path.find('/'));
-        const bool may_go =
-            offers(task) && !is_in_via(r.via, node_) && permits(by_.node_, r.requester, node_, verb::delegate, r.path);
-        wanted_ += may_go ? 1 : 0;
-        return may_go;
+        const bool chosen = is_worth_it(ahead);
+        if ((!chosen && has_suitable_) || !is_suitable(*job.movable())) {
+            return false;
+        }
+        has_suitable_ = true;
+        chosen_ += chosen ? 1 : 0;
+        return chosen;
     }
 
     std::uint64_t take(std::shared_ptr<call> job, std::string_view body,
@@ -234,20 +284,28 @@ class work_sharing::forwarding final : public job_taker {
                               .body = body},
                              job->due(), detail::pending_ptr{new moved_reply(by_, ticket)}, progress_to(job));
         job->leave_to_others();
-        ++by_.node_.counts.jobs_moved_out;
         by_.moved_.emplace(ticket, moved_job{.job = std::move(job),
                                              .ended = std::move(ended),
                                              .node = node_,
+                                             .grant = grant_.number,
                                              .request = request,
-                                             .sent = now_,
-                                             .work = grant_.work});
+                                             .sent = now_});
         ++taken_;
         return ticket;
     }
 
     [[nodiscard]] unsigned taken() const noexcept { return taken_; }
+    /// Whether one of the jobs is for that node, worth a transfer or not.
+    [[nodiscard]] bool has_suitable() const noexcept { return has_suitable_; }
 
   private:
+    [[nodiscard]] bool is_suitable(const movable_request& r) {
+        const auto task = task_of(r);
+        const auto refused = other_.refused.find(task);
+        return r.size <= other_.longest && (refused == other_.refused.end() || refused->second <= now_) &&
+               offers(task) && !is_in_via(r.via, node_) &&
+               permits(by_.node_, r.requester, node_, verb::delegate, r.path);
+    }
     // The first one for which there is no worker waits for half a job on average.
     [[nodiscard]] bool is_worth_it(std::size_t ahead) const noexcept {
         if (ahead < own_.idle) {
@@ -260,27 +318,45 @@ class work_sharing::forwarding final : public job_taker {
     [[nodiscard]] bool offers(std::string_view task) {
         if (task != last_task_) { // most jobs are of one task
             last_task_ = task;
-            last_is_offered_ = by_.out_.offers(node_, task);
+            const auto* const other = by_.find_neighbour(node_);
+            const auto tasks = other != nullptr ? other->tasks : nullptr;
+            last_is_offered_ =
+                tasks && std::ranges::any_of(tasks->entries, [&](const task_list::entry& each) {
+                    return each.verb == verb::delegate && each.task == task && !each.local && !each.must_be_signed;
+                });
         }
         return last_is_offered_;
     }
 
     work_sharing& by_;
     const std::string& node_;
+    const acquaintance& other_;
     const held_grant grant_;
     const time_point now_;
     const shareable_queue::state own_;
     std::chrono::duration<double, std::micro> required_wait_{};
     std::string last_task_;
     bool last_is_offered_ = false;
-    unsigned wanted_ = 0;
+    bool has_suitable_ = false;
+    unsigned chosen_ = 0;
     unsigned taken_ = 0;
 };
 
+// The queue is searched again only when more jobs have come. If no job is for that node, the grant is dropped.
 unsigned work_sharing::forward_jobs(const std::string& node, held_grant& by, time_point now) {
-    forwarding on_grant{*this, node, by, now};
+    const auto own = jobs_.read_state();
+    if (own.excess() == 0 || now >= by.expires || by.searched == own.movable_queued) {
+        return 0;
+    }
+    by.searched = own.movable_queued;
+    forwarding on_grant{*this, node, by, own, now};
     jobs_.offer(on_grant);
-    by.left -= on_grant.taken();
+    if (!on_grant.has_suitable()) {
+        auto& other = known_[node];
+        other.unsuitable = own.movable_queued;
+        other.unsuitable_until = now + look_every;
+    }
+    by.left = on_grant.has_suitable() ? by.left - on_grant.taken() : 0;
     return on_grant.taken();
 }
 
@@ -294,13 +370,13 @@ void work_sharing::use_held_grants(time_point now) {
 // The node to which that job was moved has granted another slot.
 void work_sharing::hold_another(std::uint64_t ticket, std::uint64_t grant) {
     if (const auto found = moved_.find(ticket); found != moved_.end()) {
-        const auto& moved = found->second;
         ++node_.counts.grants_received;
-        hold(moved.node, grant, 1, node_.time.now()).work = moved.work;
+        hold(found->second.node, grant, 1, node_.time.now());
     }
 }
 
-// A grant that has not expired may be extended.
+// A grant that has not expired may be extended. A job has to arrive before it expires, and it has taken as long to
+// come.
 work_sharing::held_grant& work_sharing::hold(std::string_view by, std::uint64_t number, unsigned slots,
                                              time_point now) {
     auto& held = held_[std::string{by}];
@@ -308,18 +384,52 @@ work_sharing::held_grant& work_sharing::hold(std::string_view by, std::uint64_t 
         held = {.number = number};
     }
     held.left = std::min(held.left + slots, slot_grants::max_slots);
-    held.expires = now + slot_grants::valid_for;
+    held.searched = 0;
+    held.expires = now + slot_grants::valid_for - known_[std::string{by}].trip.value_or(microseconds{0});
     return held;
 }
 
-microseconds work_sharing::transfer_to(std::string_view node) const {
-    const auto found = known_.find(node);
+microseconds work_sharing::acquaintance::transfer(time_point now) const {
+    return std::max(trip.value_or(first_transfer), now < surplus_until ? *surplus : microseconds{0});
+}
+
+// Until the reply, less the usual time of a job there. If that is not known, this job tells.
+void work_sharing::measure(const moved_job& moved, time_point now) {
+    const auto found = known_.find(moved.node);
     if (found == known_.end()) {
-        return first_transfer;
+        return;
     }
-    const auto& other = found->second;
-    const auto trip = other.trip.value_or(first_transfer);
-    return std::max(trip, other.surplus.value_or(microseconds{0}));
+    auto& other = found->second;
+    const auto took = elapsed(moved.sent, now);
+    if (other.service_time == microseconds{0}) {
+        other.service_time = took;
+        return;
+    }
+    if (now >= other.surplus_until) {
+        other.surplus.reset();
+    }
+    smooth(other.surplus, took - other.service_time);
+    other.surplus_until = now + surplus_valid_for;
+}
+
+// So that the job is not sent there again at once.
+void work_sharing::remember_refusal(const moved_job& moved, const protocol::failure& why, time_point now) {
+    const auto held = held_.find(moved.node);
+    if (why.code == errc::busy && held != held_.end() && held->second.number == moved.grant) {
+        held_.erase(held); // it has no more free workers
+    }
+    const auto found = known_.find(moved.node);
+    if (found == known_.end()) {
+        return;
+    }
+    const auto& request = *moved.job->movable();
+    if (why.code == errc::too_large) {
+        found->second.longest = request.size - 1;
+        return;
+    }
+    const auto retry = std::chrono::milliseconds{why.retry_ms.value_or(0)};
+    found->second.refused[std::string{task_of(request)}] =
+        now + (why.code == errc::busy ? std::min(retry, max_retry) : refusal_valid_for);
 }
 
 // A failure that says that the job has not begun returns it to the queue; anything else is its reply.
@@ -328,25 +438,29 @@ void work_sharing::on_outcome(std::uint64_t ticket, std::string_view json, subre
     if (found == moved_.end()) {
         return; // withdrawn
     }
+    const auto now = node_.time.now();
     const auto moved = std::move(found->second);
     moved_.erase(found);
     const auto& job = moved.job;
-    if (why != nullptr && !why->may_have_started && !job->ended()) {
-        --node_.counts.jobs_moved_out;
+    const auto refused = [](const subrequest_failure& by) { // which says so if the result is too large
+        return !by.may_have_started || (by.reported.code == errc::too_large && !by.reported.ran);
+    };
+    if (why != nullptr && refused(*why) && !job->ended()) {
         job->take_back();
-        held_.erase(moved.node); // it has no more free workers
+        remember_refusal(moved, why->reported, now);
         moved.ended(true);
-        balance(node_.time.now());
+        balance(now);
         return;
     }
+    ++node_.counts.jobs_moved_out;
     if (why == nullptr) {
-        smooth(known_[moved.node].surplus, elapsed(moved.sent, node_.time.now()) - moved.work);
+        measure(moved, now);
         job->done(json);
     } else {
         job->fail(named(std::move(*why), moved.node));
     }
     moved.ended(false);
-    balance(node_.time.now()); // there may be another slot
+    balance(now); // there may be another slot
 }
 
 void work_sharing::withdraw(std::uint64_t ticket) {
@@ -354,6 +468,7 @@ void work_sharing::withdraw(std::uint64_t ticket) {
         const auto request = found->second.request;
         const auto keep = std::move(found->second); // released after the request
         moved_.erase(found);
+        ++node_.counts.jobs_moved_out;
         out_.cancel(request);
     }
 }
@@ -371,12 +486,12 @@ void work_sharing::balance(time_point now) {
         own = jobs_.read_state();
     }
     if (own.excess() != 0) {
-        tell(own.excess(), now);
+        tell(own, now);
     } else if (const auto reserved = granted_.reserved(now); own.free() > reserved) {
         look_at_loads(now);
         grant_slots(own.free() - reserved, own, now);
     }
-    follow(own, now);
+    arm_timer(own, now);
 }
 
 // What a node has said since it last reported its load is newer.
@@ -385,39 +500,45 @@ void work_sharing::look_at_loads(time_point now) {
         return;
     }
     look_at_ = now + look_every;
-    list_neighbours();
+    refresh_neighbours();
     for (const auto& other : neighbours_) {
         if (other.load.queued != 0) {
             auto& about = known_[std::string{other.name}];
-            about.waiting = about.heard < other.seen ? other.load.queued : about.waiting;
+            about.waiting = about.heard < other.seen && now >= about.silent_until ? other.load.queued : about.waiting;
         }
     }
+}
+
+// The node with the most jobs, except those whose slots are reserved already; null if there is none.
+const std::string* work_sharing::most_loaded(time_point now) const {
+    const std::string* most = nullptr;
+    std::uint32_t waiting = 0;
+    for (const auto& [name, other] : known_) {
+        if (other.waiting > waiting && granted_.reserved_for(name, now) == 0) {
+            most = &name;
+            waiting = other.waiting;
+        }
+    }
+    return most;
 }
 
 // The most loaded ones first, each for the jobs that it may have.
 void work_sharing::grant_slots(unsigned slots, const shareable_queue::state& own, time_point now) {
     slots = std::min(slots, slot_grants::max_slots);
-    while (slots != 0) {
-        const std::string* most_loaded = nullptr;
-        std::uint32_t waiting = 0;
-        for (const auto& [name, other] : known_) {
-            if (other.waiting > waiting && granted_.reserved_for(name, now) == 0) {
-                most_loaded = &name;
-                waiting = other.waiting;
-            }
+    for (const std::string* to = nullptr; slots != 0 && (to = most_loaded(now)) != nullptr;) {
+        auto& other = known_.find(*to)->second;
+        if (find_neighbour(*to) == nullptr) {
+            other.waiting = 0;
+            continue;
         }
-        if (most_loaded == nullptr) {
-            return;
-        }
-        const auto given = std::min<unsigned>(slots, waiting);
+        const auto given = std::min<unsigned>(slots, other.waiting);
         slots -= given;
-        known_.find(*most_loaded)->second.granted = given;
-        push(*most_loaded, open_grant(*most_loaded, given, given, now), object([&](json_writer& w) {
-            write_member(w, "node", std::string_view{node_.name});
-            write_member(w, "free", std::uint64_t{given});
-            write_member(w, "service_us", static_cast<std::uint64_t>(own.service_time.count()));
-        }),
-             now);
+        push({.node = *to, .grant = open_grant(*to, given, given, now), .slots = given, .at = now},
+             object([&](json_writer& w) {
+                 write_member(w, "node", std::string_view{node_.name});
+                 write_member(w, "free", std::uint64_t{given});
+                 write_member(w, "service_us", static_cast<std::uint64_t>(own.service_time.count()));
+             }));
     }
 }
 
@@ -429,13 +550,19 @@ std::uint64_t work_sharing::open_grant(std::string_view to, unsigned slots, unsi
 
 // Nodes that seem to have a free worker first; the others may have become free since they reported their load. From a
 // random one on, so that all get to know it.
-void work_sharing::tell(std::uint32_t waiting, time_point now) {
+void work_sharing::tell(const shareable_queue::state& own, time_point now) {
     if (now < tell_at_) {
         return;
     }
     tell_at_ = now + tell_every;
-    list_neighbours();
-    std::erase_if(neighbours_, [](const neighbour& other) { return other.load.workers == 0; });
+    refresh_neighbours();
+    std::erase_if(neighbours_, [&](const neighbour& other) {
+        const auto found = known_.find(other.name);
+        const bool useless = found != known_.end() &&
+                             (now < found->second.silent_until ||
+                              (now < found->second.unsuitable_until && found->second.unsuitable == own.movable_queued));
+        return useless || other.load.workers == 0;
+    });
     if (neighbours_.empty()) {
         return;
     }
@@ -446,47 +573,64 @@ void work_sharing::tell(std::uint32_t waiting, time_point now) {
     });
     const auto body = object([&](json_writer& w) {
         write_member(w, "node", std::string_view{node_.name});
-        write_member(w, "waiting", std::uint64_t{waiting});
+        write_member(w, "waiting", std::uint64_t{own.excess()});
     });
     for (std::size_t i = 0; i < std::min(told_at_once, neighbours_.size()); ++i) {
-        push(neighbours_[i].name, 0, body, now);
+        push({.node = std::string{neighbours_[i].name}, .at = now}, body);
     }
 }
 
-void work_sharing::push(std::string_view node, std::uint64_t grant, const std::string& body, time_point now) {
-    known_[std::string{node}].asked = now;
-    out_.push_slots(node, grant, body);
+void work_sharing::push(const sent_slots& what, const std::string& body) {
+    auto then = [weak = std::weak_ptr{alive_}, what](std::string_view json, boost::system::error_code why) {
+        if (const auto self = weak.lock()) {
+            (*self)->on_reply(what, json, why);
+        }
+    };
+    out_.push_slots(what.node, what.grant, body, std::move(then));
 }
 
-void work_sharing::on_reply(std::string_view node, std::uint64_t grant, std::string_view json, time_point now) {
-    const auto found = known_.find(node);
-    if (found == known_.end()) {
-        return;
-    }
-    auto& other = found->second;
+void work_sharing::on_reply(const sent_slots& what, std::string_view json, boost::system::error_code why) {
+    const auto now = node_.time.now();
+    auto& other = known_[what.node];
     std::uint64_t taken = 0;
     std::uint64_t waiting = 0;
     if (!json.empty()) {
-        smooth(other.trip, elapsed(other.asked, now));
+        smooth(other.trip, elapsed(what.at, now));
         json_reader reader{json, node_.bounds.depth};
         read_members(reader, [&](std::string_view key) {
             return key == "taken" ? reader.read(taken) : key == "waiting" ? reader.read(waiting) : reader.skip();
         });
+    } else if (why == errc::deadline) {
+        other.trip = slot_grants::valid_for; // at least: a grant would arrive too late
+    } else if (why == errc::no_task) {
+        other.silent_until = now + not_shared_for;
     }
-    if (grant == 0) {
+    if (what.grant == 0) {
         return;
     }
-    other.granted -= std::min<unsigned>(other.granted, bounded(taken));
-    granted_.unreserve(node, grant, std::exchange(other.granted, 0));
+    granted_.unreserve(what.node, what.grant, what.slots - std::min(what.slots, bounded(taken)));
     // Those that it does not give are not for this node, or not worth a transfer: until it reports jobs again.
     other.waiting = taken == 0 ? 0 : bounded(waiting);
     other.heard = now;
     balance(now);
 }
 
-void work_sharing::list_neighbours() {
+const known_node* work_sharing::find_neighbour(std::string_view name) const {
+    const auto* const others = out_.registry();
+    const auto* const found = others != nullptr ? others->find(name) : nullptr;
+    return found != nullptr && out_.is_neighbour(*found) ? found : nullptr;
+}
+
+// Forgets nodes that are gone.
+void work_sharing::refresh_neighbours() {
     neighbours_.clear();
-    out_.list_neighbours(neighbours_);
+    if (const auto* const others = out_.registry()) {
+        for (const auto& [name, other] : others->nodes()) {
+            if (out_.is_neighbour(*other)) {
+                neighbours_.push_back({name, other->load, node_.peers.last_seen(name)});
+            }
+        }
+    }
     std::erase_if(known_, [&](const auto& one) {
         const bool gone = !node_.peers.address_of(one.first);
         if (gone) {
@@ -498,7 +642,7 @@ void work_sharing::list_neighbours() {
 }
 
 // What may change without an event here: jobs are to be reported again, a grant expires, others report their loads.
-void work_sharing::follow(const shareable_queue::state& own, time_point now) {
+void work_sharing::arm_timer(const shareable_queue::state& own, time_point now) {
     std::optional<time_point> next;
     if (own.excess() != 0) {
         next = tell_at_;

@@ -1,17 +1,21 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/limits.hpp>
 #include <cles/peer.hpp>
 #include <cles/sharing.hpp>
 
 #include "node/base/backoff.hpp"
 #include "node/base/deadlines.hpp"
 #include "node/node_state.hpp"
+#include "node/routing/service_registry.hpp"
 #include "node/routing/subrequest.hpp"
 #include "node/session/outbound.hpp"
 #include "node/sharing/movable_request.hpp"
 #include "node/sharing/slot_grants.hpp"
 #include "protocol/request_line.hpp"
+
+#include <boost/system/error_code.hpp>
 
 #include <chrono>
 #include <cstddef>
@@ -29,12 +33,8 @@ namespace cles::core {
 /// nodes that have jobs waiting; with jobs waiting, it tells others, and forwards jobs on the grants that it gets.
 class work_sharing : public job_sharing, public request_sharing, private deadline {
   public:
-    /// Another node that is reached without a third one.
-    struct neighbour {
-        std::string_view name;
-        node_load load;
-        time_point seen{}; ///< when it last reported its load
-    };
+    /// The reply to `PUSH cles/slots`: JSON, or why there is none.
+    using slots_reply = std::function<void(std::string_view json, boost::system::error_code why)>;
     /// What it needs from the node.
     class client {
       public:
@@ -42,12 +42,13 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
         client(const client&) = delete;
         client& operator=(const client&) = delete;
 
-        /// The neighbours that are live, by name. Valid until the next change of membership.
-        virtual void list_neighbours(std::vector<neighbour>& to) const = 0;
-        /// Whether that node is a neighbour that offers DELEGATE of the task.
-        [[nodiscard]] virtual bool offers(std::string_view node, std::string_view task) const = 0;
-        /// Sends `PUSH cles/slots`. Its reply is passed to `on_reply`, not inside this call. \param grant 0: none
-        virtual void push_slots(std::string_view node, std::uint64_t grant, std::string_view body) = 0;
+        /// The other nodes and their tasks; null if this node does not route.
+        [[nodiscard]] virtual const service_registry* registry() const = 0;
+        /// Whether that node is live, and reached by a stream, without a third node.
+        [[nodiscard]] virtual bool is_neighbour(const known_node& other) const = 0;
+        /// Sends `PUSH cles/slots`. `then` is not called inside this call. \param grant 0: none
+        virtual void push_slots(std::string_view node, std::uint64_t grant, std::string_view body,
+                                slots_reply then) = 0;
         /// Sends a request, whose outcome is reported to `reply`, never inside this call. Returns a ticket for
         /// `cancel`.
         virtual std::uint64_t forward(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
@@ -68,33 +69,38 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     /// How long a transfer is assumed to take before one has been measured.
     static constexpr std::chrono::microseconds first_transfer{1'000};
     /// The wait that a transfer saves has to exceed its duration by this factor.
-    static constexpr double worth = 1.5;
+    static constexpr double min_wait_per_transfer = 1.5;
+    /// How long the measured duration of transfers counts. So a long job does not end sharing.
+    static constexpr std::chrono::milliseconds surplus_valid_for{1'000};
+    /// How long a node is not asked to run jobs of a task that it has refused, unless it says when to retry.
+    static constexpr std::chrono::milliseconds refusal_valid_for{1'000};
+    static constexpr std::chrono::milliseconds max_retry{10'000};
+    /// How long a node that does not share its work is sent nothing.
+    static constexpr std::chrono::milliseconds not_shared_for{60'000};
+    /// Longer requests do not move. The other node would refuse what is over its limit, and close the link. (Its limit
+    /// is not known; this is less than the default.)
+    static constexpr std::size_t longest_moved = limits{}.line - limits{}.line / 16;
 
     /// All of these outlive this.
     work_sharing(node_state& host, client& out, shareable_queue& jobs, std::uint32_t seed);
     ~work_sharing() override;
 
     // job_sharing
+    [[nodiscard]] bool may_move(const call& job) const noexcept override;
     void on_change() override;
     void withdraw(std::uint64_t ticket) override;
 
     // request_sharing
     [[nodiscard]] std::unique_ptr<const movable_request> movable(const protocol::request_line& r,
-                                                                 const identity& peer) const override;
-    [[nodiscard]] std::optional<protocol::failure> use_grant(const protocol::request_line& r, const identity& peer,
-                                                             time_point now) override;
+                                                                 const identity& peer) override;
+    [[nodiscard]] std::optional<protocol::failure> use_grant(const protocol::request_line& r, const task_info& task,
+                                                             const identity& peer, time_point now) override;
     [[nodiscard]] std::string grant_another(std::string_view to) override;
     void serve_slots(reply_writer& replies, const protocol::request_line& r, const identity& peer,
                      time_point now) override;
 
     /// To be called before the client is destroyed.
     void withdraw_all();
-    /// The reply to `push_slots`; empty if there is none.
-    void on_reply(std::string_view node, std::uint64_t grant, std::string_view json, time_point now);
-
-  protected:
-    /// Expires with this, for replies that come later.
-    [[nodiscard]] std::weak_ptr<work_sharing*> alive() const noexcept { return alive_; }
 
   private:
     class forwarding; // takes jobs on one grant
@@ -104,10 +110,24 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     struct acquaintance {
         std::uint32_t waiting = 0;                        // jobs there that may be moved
         time_point heard = time_point::min();             // when it last said so
-        time_point asked{};                               // when `push_slots` was sent to it
-        unsigned granted = 0;                             // with that, and not taken yet
+        std::chrono::microseconds service_time{0};        // of a job there; 0: not known
         std::optional<std::chrono::microseconds> trip;    // how long `push_slots` takes there and back
-        std::optional<std::chrono::microseconds> surplus; // what moved jobs take longer than their work
+        std::optional<std::chrono::microseconds> surplus; // what moved jobs take longer than usual there
+        time_point surplus_until{};                       // it counts
+        time_point silent_until = time_point::min();      // it does not share its work, and is sent nothing
+        // No job was for it when so many had been queued; so it is not told of them until then.
+        std::uint64_t unsuitable = 0;
+        time_point unsuitable_until = time_point::min();
+        std::size_t longest = longest_moved;                      // request that is sent to it
+        std::map<std::string, time_point, std::less<>> refused{}; // until when, by task
+
+        [[nodiscard]] std::chrono::microseconds transfer(time_point now) const;
+    };
+    /// Another node that is reached without a third one.
+    struct neighbour {
+        std::string_view name;
+        node_load load;
+        time_point seen{}; // when it last reported its load
     };
     /// The body of `PUSH cles/slots`.
     struct slots_message {
@@ -116,20 +136,27 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
         std::uint64_t waiting = 0;
         std::uint64_t service_us = 0;
     };
+    /// A `PUSH cles/slots` that this node has sent.
+    struct sent_slots {
+        std::string node;
+        std::uint64_t grant = 0; // 0: none
+        unsigned slots = 0;      // of the grant
+        time_point at{};
+    };
     /// A grant of another node that has not been used up.
     struct held_grant {
         std::uint64_t number = 0;
         unsigned left = 0;
+        std::uint64_t searched = 0; // how many jobs had been queued when the queue was searched for one
         time_point expires{};
-        std::chrono::microseconds work{0}; // how long a job takes there
     };
     struct moved_job {
         std::shared_ptr<call> job;
         std::function<void(bool refused)> ended;
         std::string node;
+        std::uint64_t grant = 0;
         std::uint64_t request = 0; // the ticket of the client
         time_point sent{};
-        std::chrono::microseconds work{0}; // how long a job takes there
     };
 
     [[nodiscard]] static bool read(std::string_view body, std::size_t depth, slots_message& to);
@@ -138,17 +165,22 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     void balance(time_point now);
     void grant_slots(unsigned slots, const shareable_queue::state& own, time_point now);
     std::uint64_t open_grant(std::string_view to, unsigned slots, unsigned reserved, time_point now);
+    [[nodiscard]] const std::string* most_loaded(time_point now) const;
     void look_at_loads(time_point now);
-    void tell(std::uint32_t waiting, time_point now);
-    void follow(const shareable_queue::state& own, time_point now);
-    void push(std::string_view node, std::uint64_t grant, const std::string& body, time_point now);
+    void tell(const shareable_queue::state& own, time_point now);
+    void arm_timer(const shareable_queue::state& own, time_point now);
+    void push(const sent_slots& what, const std::string& body);
+    void on_reply(const sent_slots& what, std::string_view json, boost::system::error_code why);
     unsigned forward_jobs(const std::string& node, held_grant& by, time_point now);
     void use_held_grants(time_point now);
     void hold_another(std::uint64_t ticket, std::uint64_t grant);
     held_grant& hold(std::string_view by, std::uint64_t number, unsigned slots, time_point now);
     void on_outcome(std::uint64_t ticket, std::string_view json, subrequest_failure* why);
-    [[nodiscard]] std::chrono::microseconds transfer_to(std::string_view node) const;
-    void list_neighbours();
+    void remember_refusal(const moved_job& moved, const protocol::failure& why, time_point now);
+    void measure(const moved_job& moved, time_point now);
+    [[nodiscard]] bool may_forward_for(std::string_view requester);
+    [[nodiscard]] const known_node* find_neighbour(std::string_view name) const;
+    void refresh_neighbours();
     void on_deadline(time_point now) override;
 
     node_state& node_;
@@ -163,6 +195,7 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     time_point tell_at_ = time_point::min();                                             // not before
     time_point look_at_ = time_point::min();                                             // not before
     std::vector<neighbour> neighbours_;                                                  // scratch
+    bool has_logged_why_ = false;                                                        // jobs stay here
     const std::shared_ptr<work_sharing*> alive_ = std::make_shared<work_sharing*>(this); // for late replies
 };
 

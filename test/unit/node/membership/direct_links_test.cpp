@@ -11,6 +11,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using cles::time_point;
+using state = cles::core::direct_links::state;
 
 struct fixture {
     void hear(const std::string& node, std::vector<std::string> allowed = {}, std::uint64_t seq = 1) {
@@ -19,6 +20,8 @@ struct fixture {
         said.links = std::move(allowed);
         others.apply_gossip({said, 0xB, seq, 0ms}, {"10.0.0.7", false}, now, now);
     }
+
+    [[nodiscard]] state state_of(std::string_view node) const { return links.state_of(node, others); }
 
     cles::core::deadline_queue deadlines;
     cles::core::membership others{"me", 0xA, deadlines, 10};
@@ -29,31 +32,29 @@ struct fixture {
 BOOST_FIXTURE_TEST_SUITE(direct_links, fixture)
 
 BOOST_AUTO_TEST_CASE(without_a_list_all_nodes_with_an_address_are_reached) {
-    BOOST_TEST(!links.reaches("car1", others));
+    BOOST_TEST((state_of("car1") == state::none));
     hear("car1");
-    BOOST_TEST(links.reaches("car1", others));
-    BOOST_TEST(links.works("car1", others));
+    BOOST_TEST((state_of("car1") == state::untried));
 }
 
 BOOST_AUTO_TEST_CASE(the_lists_of_both_nodes_count) {
     hear("car1");
     hear("car2");
     links.allow_only({"car1"});
-    BOOST_TEST(links.reaches("car1", others));
-    BOOST_TEST(!links.reaches("car2", others));
+    BOOST_TEST((state_of("car1") == state::untried));
+    BOOST_TEST((state_of("car2") == state::none));
     links.allow_only({});
     hear("car1", {"car2"}, 2);
-    BOOST_TEST(!links.reaches("car1", others));
+    BOOST_TEST((state_of("car1") == state::none));
     hear("car1", {"car2", "me"}, 3);
-    BOOST_TEST(links.reaches("car1", others));
+    BOOST_TEST((state_of("car1") == state::untried));
 }
 
 BOOST_AUTO_TEST_CASE(a_node_that_does_not_reply_is_not_used_for_others_and_still_tried_itself) {
     hear("car1");
     BOOST_TEST(links.on_failure("car1", now));
     BOOST_TEST(!links.on_failure("car1", now));
-    BOOST_TEST(links.reaches("car1", others)); // it may have crashed
-    BOOST_TEST(!links.works("car1", others));
+    BOOST_TEST((state_of("car1") == state::silent));
 }
 
 BOOST_AUTO_TEST_CASE(the_link_is_lost_if_the_node_announces_itself_afterwards) {
@@ -61,31 +62,30 @@ BOOST_AUTO_TEST_CASE(the_link_is_lost_if_the_node_announces_itself_afterwards) {
     links.on_failure("car1", now);
     now += 1s;
     hear("car1", {}, 2);
-    BOOST_TEST(!links.reaches("car1", others));
-    BOOST_TEST(links.is_lost_since("car1", others, now - 1s));
-    BOOST_TEST(!links.is_lost_since("car1", others, now - 2s));
+    BOOST_TEST((state_of("car1") == state::lost));
+    BOOST_TEST((links.failed_at("car1") == now - 1s));
 }
 
 BOOST_AUTO_TEST_CASE(the_link_is_lost_if_another_node_has_one) {
     hear("car1");
     links.on_alive("car1");
-    BOOST_TEST(links.reaches("car1", others));
+    BOOST_TEST((state_of("car1") == state::untried));
     links.on_failure("car1", now);
     links.on_alive("car1");
-    BOOST_TEST(!links.reaches("car1", others));
+    BOOST_TEST((state_of("car1") == state::lost));
 }
 
 BOOST_AUTO_TEST_CASE(a_lost_link_is_tried_again_after_pauses_that_double) {
     hear("car1");
     links.on_failure("car1", now);
     links.on_alive("car1");
-    BOOST_TEST(!links.may_try("car1", others, now + 1999ms));
-    BOOST_TEST(links.may_try("car1", others, now + 2s));
+    BOOST_TEST(!links.is_due("car1", now + 1999ms));
+    BOOST_TEST(links.is_due("car1", now + 2s));
     now += 2s;
     links.on_failure("car1", now);
     links.on_failure("car1", now); // of the same attempt
-    BOOST_TEST(!links.may_try("car1", others, now + 3999ms));
-    BOOST_TEST(links.may_try("car1", others, now + 4s));
+    BOOST_TEST(!links.is_due("car1", now + 3999ms));
+    BOOST_TEST(links.is_due("car1", now + 4s));
 }
 
 BOOST_AUTO_TEST_CASE(a_reply_ends_it) {
@@ -93,7 +93,7 @@ BOOST_AUTO_TEST_CASE(a_reply_ends_it) {
     links.on_failure("car1", now);
     BOOST_TEST(links.on_success("car1"));
     BOOST_TEST(!links.on_success("car1"));
-    BOOST_TEST(links.works("car1", others));
+    BOOST_TEST((state_of("car1") == state::open));
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -36,9 +36,9 @@ BOOST_AUTO_TEST_CASE(ended_contacts_are_not_found_and_are_removed_together) {
     all.add(part::chosen, "car2", "tcp://b:1", now);
     BOOST_TEST(all.find_node("car1") == nullptr);
     BOOST_TEST(all.count(part::chosen) == 1U);
-    const auto urls = all.take_ended();
-    BOOST_REQUIRE(urls.size() == 1U);
-    BOOST_TEST(urls[0] == "tcp://a:1");
+    const auto ended = all.take_ended();
+    BOOST_REQUIRE(ended.size() == 1U);
+    BOOST_TEST(ended[0].url == "tcp://a:1");
     BOOST_TEST(all.take_ended().empty());
 }
 
@@ -49,6 +49,13 @@ BOOST_AUTO_TEST_CASE(url_of_another_contact_is_not_released) {
     BOOST_TEST(all.take_ended().empty());
     all.find_node("car1")->ended = true;
     BOOST_TEST(all.take_ended().size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(by_name_the_url_of_another_node_is_released) {
+    cles::core::gossip_contacts all;
+    all.add(part::bootstrap, {}, "tls://a:1", now).ended = true;
+    all.add(part::chosen, "car1", "tls://a:1", now);
+    BOOST_TEST(all.take_ended(true).size() == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(resting_nodes_expire_and_are_bounded) {

@@ -19,15 +19,15 @@ using namespace std::chrono_literals;
 struct fixture : cles::core::gossip::client, cles::core::membership::watcher {
     fixture() { others.watch(this); }
 
-    void ask(std::uint64_t ticket, std::string_view url, const cles::core::table_question& what) override {
-        asks.push_back({ticket, std::string{url}, std::string{what.since}, std::string{what.describe}});
+    void ask(std::uint64_t ticket, const destination& at, const cles::core::table_question& what) override {
+        asks.push_back({ticket, std::string{at.url}, std::string{what.since}, std::string{what.describe}});
     }
-    void ask_description(std::uint64_t ticket, std::string_view url) override {
-        whos.push_back({ticket, std::string{url}, {}, {}});
+    void ask_description(std::uint64_t ticket, const destination& at) override {
+        whos.push_back({ticket, std::string{at.url}, {}, {}});
     }
-    void push(std::string_view url, std::string_view table) override { pushed[std::string{url}] = table; }
-    [[nodiscard]] bool forwards() const override { return true; }
-    void release(std::string_view url) override { released.insert(std::string{url}); }
+    void push(const destination& at, std::string_view table) override { pushed[std::string{at.url}] = table; }
+    [[nodiscard]] bool forwards_for(std::string_view) const override { return true; }
+    void release(const destination& at) override { released.insert(std::string{at.url}); }
     void on_peer(std::string_view node, cles::core::membership::change what, std::string_view where) override {
         if (what == cles::core::membership::change::gone) {
             gossip.on_gone(node, where, clock.now());

@@ -25,7 +25,11 @@ struct fixture : cles::core::reachability::listener {
         hear("far", 0xF, {"car1", "car2"});
     }
 
-    [[nodiscard]] bool forwards() const override { return routes; }
+    [[nodiscard]] bool forwards_for(std::string_view) const override { return routes; }
+    [[nodiscard]] bool may_forward(std::string_view node, std::string_view requester) const override {
+        return !forbidden.contains(node) && (requester != "stranger" || node != "car2");
+    }
+    [[nodiscard]] bool is_member(std::string_view node) const override { return !removed.contains(node); }
     void on_route_lost(std::string_view node, std::string_view address) override {
         lost.emplace_back(std::string{node} + " by " + std::string{address});
     }
@@ -74,6 +78,8 @@ struct fixture : cles::core::reachability::listener {
     }
 
     bool routes = true;
+    std::set<std::string, std::less<>> forbidden; // neighbours that may not forward
+    std::set<std::string, std::less<>> removed;   // from the roster
     std::vector<std::string> lost;
     std::set<std::string> changed;
     time_point now = time_point{} + 1h;
@@ -121,13 +127,13 @@ BOOST_AUTO_TEST_CASE(a_node_that_does_not_forward_advertises_only_itself) {
 
 BOOST_AUTO_TEST_CASE(a_node_that_has_never_replied_is_not_advertised_as_a_neighbour) {
     BOOST_TEST(!advert("car2", "car1").value().hops);
-    reach.on_opened("tcp://10.0.0.7:12"); // nothing has failed
+    reach.on_opened("car2"); // nothing has failed
     BOOST_TEST(!advert("car2", "car1").value().hops);
     reach.on_reached("car2");
     BOOST_TEST(advert("car2", "car1").value().hops.value() == 1U);
     reach.lose("car2", now);
     BOOST_TEST(!advert("car2", "car1").value().hops);
-    reach.on_opened("tcp://10.0.0.7:12");
+    reach.on_opened("car2");
     BOOST_TEST(advert("car2", "car1").value().hops.value() == 1U);
 }
 
@@ -146,6 +152,89 @@ BOOST_AUTO_TEST_CASE(a_number_that_others_state_for_this_node_is_not_ahead_of_it
     reply("car2", {5, 1});
     BOOST_TEST(reach.next_hop_to("far", {}) == "car2");
 }
+
+BOOST_AUTO_TEST_CASE(its_number_stays_below_the_greatest_one_that_counts) {
+    constexpr auto most = std::uint64_t{1} << 62U;
+    cles::core::announcement said{.node = "me"};
+    others.announce_self(said, 1, now);
+    cles::core::peer_table table;
+    table.node = "car1";
+    table.routes = {{.epoch = 0xA, .advert = {most, 1}}};
+    reach.on_reply(table);
+    for (int i = 0; i < 3; ++i) {
+        now += 1s;
+        reach.on_question({.distance = 16, .by = "car1"}, now);
+        ask("car1", 0xA, {most + 2, 16});
+    }
+    BOOST_TEST(advert("me", "car1").value().seq == most);
+}
+
+BOOST_AUTO_TEST_CASE(only_a_node_itself_states_a_route_of_no_links) {
+    reply("car2", {5, 0});
+    BOOST_TEST(!reach.hops_to("far"));
+    cles::core::peer_table table;
+    table.node = "car1";
+    table.routes = {{.epoch = 0xB, .advert = {5, 3}}};
+    reach.on_reply(table);
+    BOOST_TEST(advert("car1", "car2").value().seq == 0U);
+    table.routes = {{.epoch = 0xB, .advert = {5, 0}}};
+    reach.on_reply(table);
+    BOOST_TEST(advert("car1", "car2").value().seq == 5U);
+}
+
+// -- in a secured fleet ----------------------------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(a_neighbour_without_the_right_to_forward_states_only_its_own_route) {
+    cles::core::announcement said{.node = "me"};
+    others.announce_self(said, 1, now);
+    forbidden.insert("car2");
+    reply("car2", {5, 1});
+    BOOST_TEST(!reach.hops_to("far"));
+    cles::core::peer_table table;
+    table.node = "car2";
+    table.routes = {{.epoch = 0xC, .advert = {7, 0}}, {.epoch = 0xA, .advert = {900, 1}}};
+    reach.on_reply(table);
+    BOOST_TEST(advert("car2", "car1").value().seq == 7U);
+    BOOST_TEST(advert("me", "car1").value().seq < 900U);
+    reply("car1", {5, 2});
+    BOOST_TEST(reach.next_hop_to("far", {}) == "car1");
+}
+
+BOOST_AUTO_TEST_CASE(a_route_ends_with_the_right_of_its_neighbour) {
+    reply("car2", {5, 1});
+    reply("car1", {5, 2});
+    lost.clear();
+    changed.clear();
+    news();
+    forbidden.insert("car2");
+    BOOST_TEST(reach.next_hop_to("far", {}) == "car1");
+    reach.on_rights_changed();
+    BOOST_TEST(lost == (std::vector<std::string>{"far by tcp://10.0.0.7:12"}), boost::test_tools::per_element());
+    BOOST_TEST(changed.contains("far"));
+    BOOST_TEST(news().contains("far"));
+    forbidden.clear();
+    BOOST_TEST(reach.next_hop_to("far", {}) == "car2");
+}
+
+BOOST_AUTO_TEST_CASE(a_request_of_another_takes_a_route_whose_neighbour_may_forward_for_that_one) {
+    reply("car2", {5, 1});
+    reply("car1", {5, 2});
+    BOOST_TEST(reach.next_hop_to("far", {}, "somebody") == "car2");
+    BOOST_TEST(reach.next_hop_to("far", {}, "stranger") == "car1");
+    BOOST_TEST(reach.next_hop_to("far", "car1", "stranger").empty());
+    BOOST_TEST(reach.next_hop_to("car2", {}, "stranger") == "car2"); // it is the target
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_is_not_in_the_roster_has_no_route) {
+    removed.insert("far");
+    reply("car2", {5, 1});
+    BOOST_TEST(!reach.hops_to("far"));
+    ask("car1", 0xF, {6, 16});
+    BOOST_TEST(wanted("far").empty());
+    BOOST_TEST(!advert("far", "car1"));
+}
+
+// -- losses ----------------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(a_route_that_is_withdrawn_twice_is_lost_once) {
     reply("car2", {5, 1});
@@ -290,6 +379,30 @@ BOOST_AUTO_TEST_CASE(feeds_leave_a_link_that_is_lost) {
     BOOST_TEST(lost == (std::vector<std::string>{"car2 by tcp://10.0.0.7:12"}), boost::test_tools::per_element());
 }
 
+BOOST_AUTO_TEST_CASE(feeds_leave_a_link_that_the_links_of_a_node_exclude) {
+    reply("car2", {5, 1});
+    changed.clear();
+    hear("car2", 0xC, {"car1"}, 2);
+    reach.on_links_announced("car2");
+    BOOST_TEST(lost == (std::vector<std::string>{"car2 by tcp://10.0.0.7:12", "far by tcp://10.0.0.7:12"}),
+               boost::test_tools::per_element());
+    BOOST_TEST(changed.contains("car2"));
+    BOOST_TEST(changed.contains("far"));
+    hear("car2", 0xC, {}, 3);
+    lost.clear();
+    reach.on_links_announced("car2");
+    BOOST_TEST(lost.empty());
+}
+
+BOOST_AUTO_TEST_CASE(feeds_leave_links_that_this_node_gives_up) {
+    reach.allow_only({"car1"});
+    BOOST_TEST(lost == (std::vector<std::string>{"car2 by tcp://10.0.0.7:12"}), boost::test_tools::per_element());
+    lost.clear();
+    reach.allow_only({});
+    BOOST_TEST(lost.empty());
+    BOOST_TEST(changed.contains("car2"));
+}
+
 BOOST_AUTO_TEST_CASE(the_address_at_which_a_node_replied_is_preferred_to_one_that_others_report) {
     others.prefer_address("car1", "0000000b", "tcp://10.0.1.7:11");
     BOOST_TEST(others.address_of("car1").value() == "tcp://10.0.1.7:11");
@@ -347,11 +460,11 @@ BOOST_AUTO_TEST_CASE(another_incarnation_has_no_routes_yet) {
     BOOST_TEST(reach.next_hop_to("far", {}).empty());
 }
 
-BOOST_AUTO_TEST_CASE(an_address_that_cannot_be_reached_is_that_of_a_node) {
+BOOST_AUTO_TEST_CASE(a_node_to_which_no_link_can_be_opened_is_not_used) {
     reply("car2", {5, 1});
-    reach.on_unreachable("tcp://10.0.0.7:12", now);
+    reach.on_unreachable("car2", now);
     BOOST_TEST(reach.next_hop_to("far", {}).empty());
-    reach.on_unreachable("tcp://10.0.0.9:1", now);
+    reach.on_unreachable("nobody", now);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -23,8 +23,13 @@ struct fixture {
     [[nodiscard]] auto usable() const {
         return [this](std::string_view by) { return !broken.contains(by); };
     }
+    static bool all(std::string_view) { return true; }
+    static bool offers(const cles::core::route_table& in, std::string_view name, std::string_view by) {
+        const auto found = in.neighbours_of(name);
+        return std::ranges::find(found, by) != found.end();
+    }
     void offer(std::string_view by, std::uint64_t seq, std::optional<unsigned> hops, std::uint32_t run = epoch) {
-        table.apply("far", run, by, {seq, hops});
+        table.apply("far", run, by, {seq, hops}, usable());
     }
     std::string hop(std::string_view avoid = {}) {
         return std::string{table.next_hop("far", usable(), [avoid](std::string_view by) { return by == avoid; })};
@@ -141,15 +146,25 @@ BOOST_AUTO_TEST_CASE(a_route_has_at_most_sixteen_links) {
 
 BOOST_AUTO_TEST_CASE(the_table_is_bounded) {
     cles::core::route_table small{2};
+    std::uint32_t run = 0;
     for (const auto* name : {"x", "y", "z"}) {
-        small.apply(name, 1, "a", {1, 1});
+        small.apply(name, ++run, "a", {1, 1}, all);
     }
     BOOST_TEST(small.size() == 2U);
     for (int i = 0; i < 40; ++i) {
-        small.apply("x", 1, "n" + std::to_string(i), {1, 1});
+        small.apply("x", 1, "n" + std::to_string(i), {1, 1}, all);
     }
-    BOOST_TEST(!small.is_offered("x", "n39"));
-    BOOST_TEST(small.is_offered("x", "n14"));
+    BOOST_TEST(!offers(small, "x", "n39"));
+    BOOST_TEST(offers(small, "x", "n14"));
+}
+
+BOOST_AUTO_TEST_CASE(of_two_nodes_with_one_epoch_the_last_counts) {
+    offer("a", 7, 1);
+    table.apply("near", epoch, "b", {1, 0}, all);
+    BOOST_TEST(table.size() == 1U);
+    BOOST_TEST(hop().empty());
+    BOOST_TEST(offers(table, "near", "b"));
+    BOOST_TEST((advert() == route_advert{}));
 }
 
 BOOST_AUTO_TEST_CASE(a_newer_offer_replaces_the_oldest_where_there_are_sixteen) {
@@ -157,15 +172,15 @@ BOOST_AUTO_TEST_CASE(a_newer_offer_replaces_the_oldest_where_there_are_sixteen) 
         offer("n" + std::to_string(i), 5 + i % 2, 1);
     }
     offer("late", 5, 1);
-    BOOST_TEST(!table.is_offered("far", "late"));
+    BOOST_TEST(!offers(table, "far", "late"));
     offer("late", 6, 0);
     BOOST_TEST(hop() == "late");
 }
 
 BOOST_AUTO_TEST_CASE(the_destinations_of_a_neighbour_are_known) {
     offer("a", 7, 1);
-    table.apply("near", 1, "a", {1, 0});
-    table.apply("near", 1, "b", {1, 2});
+    table.apply("near", 1, "a", {1, 0}, all);
+    table.apply("near", 1, "b", {1, 2}, all);
     BOOST_TEST(table.destinations_by("a").size() == 2U);
     BOOST_TEST(table.destinations_by("b").size() == 1U);
     table.forget("near");

@@ -9,6 +9,8 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -30,10 +32,19 @@ struct fixture : cles::core::gossip::client, cles::core::membership::watcher {
         });
     }
 
-    void ask(std::uint64_t, std::string_view, const cles::core::table_question&) override {}
-    void ask_description(std::uint64_t, std::string_view) override {}
-    void push(std::string_view, std::string_view) override {}
-    void release(std::string_view) override {}
+    void ask(std::uint64_t ticket, const destination& at, const cles::core::table_question& what) override {
+        asks.push_back({ticket, std::string{at.url}, std::string{at.node}, what.routes.distance});
+    }
+    void ask_description(std::uint64_t, const destination&) override {}
+    void push(const destination& at, std::string_view table) override {
+        pushed[std::string{at.url} + " " + std::string{at.node}] = table;
+    }
+    void release(const destination&) override {}
+    [[nodiscard]] bool forwards_for(std::string_view) const override { return true; }
+    [[nodiscard]] bool may_forward(std::string_view node, std::string_view) const override {
+        return forwarders.contains(node);
+    }
+    [[nodiscard]] bool is_member(std::string_view node) const override { return !removed.contains(node); }
     void on_stated_roster(std::string_view node, std::uint32_t version) override {
         rosters.push_back(std::string{node} + " " + std::to_string(version));
     }
@@ -83,6 +94,42 @@ struct fixture : cles::core::gossip::client, cles::core::membership::watcher {
     }
     [[nodiscard]] bool tells(const std::string& part) { return told().find(part) != std::string::npos; }
 
+    struct asked {
+        std::uint64_t ticket;
+        std::string url;
+        std::string node;
+        unsigned distance;
+    };
+    /// The nodes car1 and car2 are known, which do not have a link to car3, and car1 is asked for routes.
+    asked begin_routes() {
+        const auto of = [](const std::string& name, const std::string& more) {
+            return R"({"node":")" + name + R"(","endpoints":["tls://10.0.0.)" + name.substr(3) +
+                   R"(:1"],"tasks":"00")" + more + "}";
+        };
+        hear(entry(1, of("car1", ""), 1));
+        hear(entry(1, of("car2", ""), 2, 0, "car2"));
+        hear(entry(1, of("car3", R"(,"links":["car1","car2"])"), 3, 0, "car3"));
+        gossip.reach().allow_only({"car1", "car2"});
+        gossip.start(clock.now());
+        pass(5ms);
+        for (const auto& each : asks) {
+            if (each.node == "car1") {
+                return each;
+            }
+        }
+        BOOST_ERROR("car1 is not asked");
+        return {};
+    }
+    /// A table of car1 with a route to car3.
+    static std::string routes(const std::string& more = R"(,"next":"00000001.9")") {
+        return R"({"node":"car1","epoch":"00000001","peers":[],"beats":{},"routes":{"00000003":[5,1]})" + more + "}";
+    }
+    bool push_routes(const observed_source& by) { return gossip.on_pushed_table(routes(""), by, clock.now()); }
+
+    std::vector<asked> asks;
+    std::map<std::string, std::string> pushed;                     // by URL and node
+    std::set<std::string, std::less<>> forwarders{"car1", "car2"}; // that may forward for this node
+    std::set<std::string, std::less<>> removed;
     std::vector<std::string> rosters;
     std::vector<std::string> probes;
     std::uint64_t last_probe = 0;
@@ -272,6 +319,68 @@ BOOST_AUTO_TEST_CASE(endpoints_that_mean_something_else_elsewhere_do_not_count) 
     BOOST_TEST(tells(all));
     hear(entry(3, body("tls://127.0.0.1:1")), "tls://127.0.0.1:9");
     BOOST_TEST(where() == "tls://127.0.0.1:1");
+}
+
+BOOST_AUTO_TEST_CASE(a_known_node_is_asked_by_name_and_its_routes_count) {
+    const auto car1 = begin_routes();
+    BOOST_TEST(car1.url == "tls://10.0.0.1:1");
+    BOOST_TEST(car1.distance == 16U);
+    BOOST_TEST(gossip.reach().next_hop_to("car3", {}).empty());
+    gossip.on_answer(car1.ticket, routes(), clock.now());
+    BOOST_TEST(gossip.reach().next_hop_to("car3", {}) == "car1");
+    BOOST_TEST(pushed["tls://10.0.0.2:1 car2"].find(R"("routes":{"00000003":[5,2]})") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(routes_from_an_address_without_a_name_do_not_count) {
+    begin_routes();
+    asks.clear();
+    gossip.set_seeds({"tls://10.0.0.9:1"}, clock.now());
+    pass(5ms);
+    BOOST_REQUIRE(!asks.empty());
+    BOOST_TEST(asks.back().url == "tls://10.0.0.9:1");
+    BOOST_TEST(asks.back().node.empty());
+    gossip.on_answer(asks.back().ticket, routes(), clock.now());
+    BOOST_TEST(gossip.reach().next_hop_to("car3", {}).empty());
+}
+
+BOOST_AUTO_TEST_CASE(routes_that_are_pushed_count_only_on_a_link_of_their_node) {
+    begin_routes();
+    BOOST_TEST(push_routes(observed_source::at("tls://10.0.0.1:1"))); // anybody's
+    BOOST_TEST(push_routes({.host = "10.0.0.1", .local = false, .name = "car2"}));
+    BOOST_TEST(gossip.reach().next_hop_to("car3", {}).empty());
+    BOOST_TEST(push_routes({.host = "10.0.0.1", .local = false, .name = "car1"}));
+    BOOST_TEST(gossip.reach().next_hop_to("car3", {}) == "car1");
+}
+
+BOOST_AUTO_TEST_CASE(routes_of_a_member_that_may_not_forward_do_not_count) {
+    forwarders.erase("car1");
+    begin_routes();
+    BOOST_TEST(push_routes({.host = "10.0.0.1", .local = false, .name = "car1"}));
+    BOOST_TEST(gossip.reach().next_hop_to("car3", {}).empty());
+}
+
+BOOST_AUTO_TEST_CASE(of_several_announced_addresses_the_one_that_answers_is_preferred) {
+    hear(entry(7, R"({"node":"car1","endpoints":["tls://10.0.0.1:1","tls://10.0.0.2:1"]})"));
+    others.prefer_address("car1", "00000001", "tls://10.0.0.3:1", true);
+    BOOST_TEST(where() == "tls://10.0.0.1:1");
+    others.prefer_address("car1", "00000001", "tls://10.0.0.2:1", true);
+    BOOST_TEST(where() == "tls://10.0.0.2:1");
+}
+
+BOOST_AUTO_TEST_CASE(the_address_at_which_a_seed_has_replied_is_preferred) {
+    cles::core::seeds configured{7};
+    configured.set({"tls://10.0.0.2:1", "tls://10.0.0.3:1", "tls://10.0.0.1:1"});
+    configured.on_answer("tls://10.0.0.2:1", "car1");
+    configured.on_answer("tls://10.0.0.3:1", "car1");
+    configured.prefer_in(others); // it is not known yet
+    hear(entry(7, R"({"node":"car1","endpoints":["tls://10.0.0.1:1","tls://10.0.0.2:1"]})"));
+    BOOST_TEST(where() == "tls://10.0.0.1:1");
+    configured.prefer_in(others);
+    BOOST_TEST(where() == "tls://10.0.0.2:1"); // it has not announced the other
+    configured.on_answer("tls://10.0.0.1:1", "car1");
+    others.prefer_address("car1", "00000001", "tls://10.0.0.1:1", true);
+    configured.prefer_in(others);
+    BOOST_TEST(where() == "tls://10.0.0.1:1"); // one of them is in use already
 }
 
 BOOST_AUTO_TEST_CASE(the_stated_roster_is_reported) {

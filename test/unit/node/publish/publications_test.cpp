@@ -287,6 +287,17 @@ BOOST_AUTO_TEST_CASE(retiring_forgets_the_value_but_keeps_subscribers) {
     BOOST_TEST((all.tasks() == std::set<std::string>{"job"}));
 }
 
+BOOST_AUTO_TEST_CASE(all_nouns_of_a_task_retire_together) {
+    for (const auto* const noun : {"job", "job/1", "job/2/3", "jobs/1", "jo"}) {
+        all.publish_body(noun, "[1]");
+    }
+    BOOST_TEST(all.retire_all("job") == 3U);
+    BOOST_TEST(all.retire_all("job") == 0U);
+    BOOST_TEST(all.find("job/2/3") == nullptr);
+    BOOST_TEST(all.find("jobs/1")->last_body() == "[1]");
+    BOOST_TEST(all.find("jo")->last_body() == "[1]");
+}
+
 BOOST_AUTO_TEST_CASE(a_noun_cannot_retire_or_be_published_while_a_value_of_it_is_written) {
     fixture small{cles::limits{.nouns = 2}};
     small.all.publish_body("job/1", "[1]");

@@ -55,6 +55,16 @@ BOOST_AUTO_TEST_CASE(no_target_without_hops_left) {
     BOOST_TEST(ways.count() == 0U);
 }
 
+BOOST_AUTO_TEST_CASE(the_error_without_hops_left_says_how_many_there_were_and_are_at_most) {
+    for (const std::string verb : {"PULL", "BIND"}) {
+        const auto said = link.ask(verb + " car2:speed hops=0 via=car7,car8,car9");
+        BOOST_TEST(
+            said.find("car1: the request for 'car2' has been forwarded 3 times, and hops=3 permits no more: state "
+                      "a greater one, at most 16") != std::string::npos,
+            said);
+    }
+}
+
 BOOST_AUTO_TEST_CASE(node_in_via_does_not_forward) {
     BOOST_TEST(link.kind("PULL car2:speed via=car3,car1") == "no_target");
     BOOST_TEST(ways.count() == 0U);

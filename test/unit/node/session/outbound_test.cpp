@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "node/routing/subrequest.hpp"
 #include "node/session/outbound.hpp"
 #include "support/recorded_reply.hpp"
 #include "support/sent_request.hpp"
@@ -250,6 +251,19 @@ BOOST_AUTO_TEST_CASE(a_reply_over_the_limit_fails_its_request_and_the_link_ends)
     BOOST_TEST(link.finishes == 1);
     link.reset();
     BOOST_TEST((eight->code == errc::unavailable));
+}
+
+// Nodes that forward do not send it to another node.
+BOOST_AUTO_TEST_CASE(a_reply_over_the_limit_says_that_the_handler_has_run) {
+    cles::core::subrequest_failure found{.may_have_started = false};
+    auto operation = cles::detail::pending_ptr{
+        new cles::core::subrequest([&](std::string_view, cles::core::subrequest_failure* why) { found = *why; })};
+    link.session().asking().send({.verb = verb::delegate, .noun = "car2:work", .id = 7}, node.clock.now() + 5s,
+                                 node.clock.now(), std::move(operation));
+    link.overlong("id=7 {\"a\":\"xxxx");
+    BOOST_TEST(found.may_have_started);
+    BOOST_TEST(found.reported.ran);
+    BOOST_TEST((found.reported.code == errc::too_large));
 }
 
 BOOST_AUTO_TEST_CASE(requests_pending_at_stop_complete_through_the_queue_with_their_progress_callback) {

@@ -51,12 +51,14 @@ BOOST_AUTO_TEST_CASE(a_member_that_was_removed_may_do_nothing) {
 }
 
 BOOST_AUTO_TEST_CASE(the_roster_is_exempt_and_other_reserved_nouns_are_not) {
+    const std::string spans = "car1:cles/trace/4bf92f3577b34da6a3ce929d0e0e4736";
     security->denied = {"car2 PULL car1:cles/roster", "car2 PULL car1:cles", "car2 PULL car1:cles/metrics",
-                        "car2 PUSH car1:cles/cancel/5"};
+                        "car2 PULL " + spans, "car2 PUSH car1:cles/cancel/5"};
     BOOST_TEST(link.kind("PULL car1:cles/roster id=7") == "id=7 ok");
     BOOST_TEST(link.kind("PUSH car1:cles/cancel/5 id=8") == "id=8 ok");
     BOOST_TEST(link.kind("PULL car1:cles id=9") == "id=9 denied");
     BOOST_TEST(link.kind("PULL car1:cles/metrics id=10") == "id=10 denied");
+    BOOST_TEST(link.kind("PULL " + spans + " id=11") == "id=11 denied");
 }
 
 BOOST_AUTO_TEST_CASE(rules_of_the_program_narrow_the_rights) {

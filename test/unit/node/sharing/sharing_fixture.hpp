@@ -14,6 +14,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -33,12 +34,15 @@ class test_queue final : public shareable_queue {
     [[nodiscard]] state read_state() const override {
         auto now = figures;
         now.waiting = static_cast<std::uint32_t>(waiting.size());
+        now.movable = static_cast<std::uint32_t>(
+            std::ranges::count_if(waiting, [](const job& each) { return each.call->movable() != nullptr; }));
         return now;
     }
     void offer(job_taker& to) override {
         std::vector<std::size_t> wanted;
         for (std::size_t i = 0; i < waiting.size() && !to.full(); ++i) {
-            if (to.wants(*waiting[i].call, i)) {
+            ++offered;
+            if (to.choose(*waiting[i].call, i)) {
                 wanted.push_back(i);
             }
         }
@@ -54,6 +58,7 @@ class test_queue final : public shareable_queue {
                                  ended += refused ? 0 : 1;
                                  std::erase_if(moved, [&](const job& each) { return each.call == call; });
                                  if (refused) {
+                                     ++figures.movable_queued;
                                      waiting.push_back({call, body, 0});
                                  }
                              })});
@@ -63,7 +68,8 @@ class test_queue final : public shareable_queue {
     state figures{.workers = 1, .service_time = std::chrono::milliseconds{10}};
     std::vector<job> waiting;
     std::vector<job> moved;
-    int ended = 0; ///< moved jobs that have been answered
+    int ended = 0;   ///< moved jobs that have been answered
+    int offered = 0; ///< how often a job was
 };
 
 /// The node car1, which shares the jobs of a queue with car2; the test plays the others.
@@ -84,6 +90,7 @@ struct sharing_fixture : routing_fixture, private core::work_sharing::client {
         link.ask(line);
         if (!node.started.empty()) {
             queue.waiting.push_back({node.started.back()->call, node.started.back()->body, 0});
+            ++queue.figures.movable_queued;
         }
     }
     /// The reply of car1 to a grant for so many jobs by car2.
@@ -103,6 +110,7 @@ struct sharing_fixture : routing_fixture, private core::work_sharing::client {
     [[nodiscard]] core::counters& counts() const { return node.counts(); }
 
     test_queue queue;
+    std::set<std::string> far; ///< nodes that are no neighbours
     std::unique_ptr<core::work_sharing> sharing =
         std::make_unique<core::work_sharing>(*node.host, static_cast<core::work_sharing::client&>(*this), queue, 7);
 
@@ -112,26 +120,18 @@ struct sharing_fixture : routing_fixture, private core::work_sharing::client {
         offer("car2", task("DELEGATE", "work"), {.workers = 1});
     }
 
-    void list_neighbours(std::vector<core::work_sharing::neighbour>& to) const override {
-        for (const auto& [name, other] : routing->registry().nodes()) {
-            to.push_back({name, other->load, node.host->peers.last_seen(name)});
-        }
-    }
-    [[nodiscard]] bool offers(std::string_view name, std::string_view task) const override {
-        const auto* const other = routing->registry().find(name);
-        return other != nullptr && other->tasks &&
-               std::any_of(other->tasks->entries.begin(), other->tasks->entries.end(),
-                           [&](const auto& each) { return each.verb == verb::delegate && each.task == task; });
-    }
-    void push_slots(std::string_view name, std::uint64_t grant, std::string_view body) override {
+    [[nodiscard]] const core::service_registry* registry() const override { return &routing->registry(); }
+    [[nodiscard]] bool is_neighbour(const core::known_node& other) const override { return !far.contains(other.name); }
+    void push_slots(std::string_view name, std::uint64_t grant, std::string_view body,
+                    core::work_sharing::slots_reply then) override {
         const auto noun = std::string{name} + ":cles/slots";
         const auto adverbs = grant != 0 ? "grant=" + protocol::grant_text(grant) : std::string{};
         ways.send({.verb = verb::push, .noun = noun, .adverbs = adverbs, .body = body},
                   node.clock.now() + core::slot_grants::valid_for,
-                  detail::pending_ptr{new core::subrequest(
-                      [this, name = std::string{name}, grant](std::string_view json, core::subrequest_failure*) {
-                          sharing->on_reply(name, grant, json, node.clock.now());
-                      })},
+                  detail::pending_ptr{new core::subrequest([then = std::move(then)](std::string_view json,
+                                                                                    core::subrequest_failure* why) {
+                      then(json, why != nullptr ? make_error_code(why->reported.code) : boost::system::error_code{});
+                  })},
                   {}, {});
     }
     std::uint64_t forward(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,

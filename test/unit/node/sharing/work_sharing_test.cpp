@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/sharing/work_sharing.hpp"
 #include "support/reply_text.hpp"
+#include "support/scripted_security.hpp"
 #include "unit/node/sharing/sharing_fixture.hpp"
 
 #include <boost/system/errc.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -51,9 +53,10 @@ BOOST_AUTO_TEST_CASE(jobs_are_forwarded_on_a_grant) {
     BOOST_TEST(grant(2) == "id=900 {\"taken\":2,\"waiting\":1}\n");
     BOOST_TEST(sent().text == "DELEGATE car2:work/2 hops=0 via=car1 grant=00000000000000aa {\"n\":2}");
     BOOST_TEST(queue.waiting.at(0).body == "{\"n\":3}");
-    BOOST_TEST(counts().jobs_moved_out == 2U);
+    BOOST_TEST(counts().jobs_moved_out == 0U); // until it is known that they do not return
     BOOST_TEST(counts().grants_received == 1U);
     sent().answers("{\"x\":1}");
+    BOOST_TEST(counts().jobs_moved_out == 1U);
     BOOST_TEST(link.take() == "id=2 {\"x\":1}\n");
     BOOST_TEST(queue.ended == 1);
 }
@@ -70,16 +73,21 @@ BOOST_AUTO_TEST_CASE(the_failure_of_the_other_node_is_the_reply) {
 
 BOOST_AUTO_TEST_CASE(a_job_refused_before_it_began_returns_to_the_queue) {
     const std::string refusals[] = {R"({"error":"busy","message":"full"})", R"({"error":"no_task","message":"gone"})",
-                                    R"({"error":"denied","message":"no"})", R"({"error":"no_target","message":"no"})"};
+                                    R"({"error":"denied","message":"no"})", R"({"error":"no_target","message":"no"})",
+                                    R"({"error":"too_large","message":"a line has at most 9 bytes"})"};
     submit_jobs(1);
     for (const auto& refusal : refusals) {
-        grant(1);
+        node.pass(1s);
+        BOOST_TEST(grant(1) == "id=900 {\"taken\":1,\"waiting\":0}\n");
         sent().refuses(refusal);
         BOOST_TEST(link.take().empty());
         BOOST_TEST(queue.waiting.size() == 1U);
         BOOST_TEST(queue.ended == 0);
         BOOST_TEST(counts().jobs_moved_out == 0U);
     }
+    queue.waiting.clear();
+    submit("DELEGATE car1:work id=9"); // shorter than the one that was too large
+    node.pass(1s);
     grant(1);
     sent().fails(make_error_code(boost::system::errc::connection_refused), "not reached");
     BOOST_TEST(queue.waiting.size() == 1U);
@@ -160,7 +168,99 @@ BOOST_AUTO_TEST_CASE(what_stays) {
     submit("DELEGATE car1:other id=4"); // car2 does not offer it
     submit("DELEGATE car1:work id=5 via=car2");
     BOOST_TEST(queue.waiting.size() == 5U);
-    BOOST_TEST(grant(5) == "id=900 {\"taken\":0,\"waiting\":5}\n");
+    BOOST_TEST(grant(5) == "id=900 {\"taken\":0,\"waiting\":0}\n");
+}
+
+BOOST_AUTO_TEST_CASE(a_request_without_room_for_another_adverb_stays) {
+    const auto adverbs = [](int count) {
+        std::string all;
+        for (int i = 0; i < count; ++i) {
+            all += std::string{" x"} + static_cast<char>('a' + i) + "=1";
+        }
+        return all;
+    };
+    submit("DELEGATE car1:work/1 id=1" + adverbs(10));
+    BOOST_TEST(grant(1).find("\"taken\":0") != std::string::npos);
+    submit("DELEGATE car1:work/2 id=2" + adverbs(9));
+    BOOST_TEST(grant(1).find("\"taken\":1") != std::string::npos);
+    BOOST_TEST(sent().text == "DELEGATE car2:work/2 hops=0 via=car1" + adverbs(9) + " grant=00000000000000aa {}");
+}
+
+BOOST_AUTO_TEST_CASE(a_long_request_stays) {
+    submit("DELEGATE car1:work id=1 {\"x\":\"" + std::string(1'000'000, 'x') + "\"}");
+    BOOST_TEST(queue.waiting.at(0).call->movable() == nullptr);
+}
+
+BOOST_AUTO_TEST_CASE(what_was_too_large_for_a_node_is_not_sent_there_again) {
+    submit("DELEGATE car1:work id=1 {\"x\":\"" + std::string(5'000, 'x') + "\"}");
+    submit("DELEGATE car1:work id=2 {\"x\":\"short\"}");
+    grant(1);
+    sent().refuses(R"({"error":"too_large","message":"a line has at most 4096 bytes"})");
+    BOOST_TEST(queue.waiting.size() == 2U);
+    node.pass(10s);
+    BOOST_TEST(grant(2).find("\"taken\":1") != std::string::npos);
+    BOOST_TEST(sent().text.ends_with("{\"x\":\"short\"}"));
+}
+
+BOOST_AUTO_TEST_CASE(a_result_that_is_too_large_is_the_reply) {
+    submit_jobs(1);
+    grant(1);
+    sent().refuses(R"({"error":"too_large","message":"the answer","ran":true})");
+    BOOST_TEST(code_of(link.take()) == "too_large");
+    BOOST_TEST(queue.waiting.empty());
+}
+
+BOOST_AUTO_TEST_CASE(tasks_that_stay_at_the_other_node_are_not_sent_there) {
+    node.on_later(verb::delegate, "own");
+    node.on_later(verb::delegate, "safe");
+    offer("car3", R"({"verb":"DELEGATE","task":"own","local":true},{"verb":"DELEGATE","task":"safe","signed":true})",
+          {.workers = 1});
+    submit("DELEGATE car1:own id=1");
+    submit("DELEGATE car1:safe id=2");
+    BOOST_TEST(grant(2, "00000000000000aa", "car3").find("\"taken\":0") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(a_task_that_a_node_refuses_is_not_sent_there_at_once) {
+    node.on_later(verb::delegate, "other");
+    hear("car2", "new digest", {.workers = 1});
+    sent().answers(description("car2", task("DELEGATE", "work") + "," + task("DELEGATE", "other")));
+    submit_jobs(1);
+    grant(1);
+    sent().refuses(R"({"error":"denied","message":"no"})");
+    BOOST_TEST(grant(1).find("\"taken\":0") != std::string::npos);
+    submit("DELEGATE car1:other id=7");
+    BOOST_TEST(grant(2).find("\"taken\":1") != std::string::npos); // other tasks are not concerned
+    BOOST_TEST(sent().text.starts_with("DELEGATE car2:other"));
+    node.pass(999ms);
+    BOOST_TEST(grant(1).find("\"taken\":0") != std::string::npos);
+    node.pass(1ms);
+    BOOST_TEST(grant(1).find("\"taken\":1") != std::string::npos);
+    sent().refuses(R"({"error":"busy","message":"the dock is full","retry_ms":250})");
+    node.pass(249ms);
+    BOOST_TEST(grant(1).find("\"taken\":0") != std::string::npos);
+    node.pass(1ms);
+    BOOST_TEST(grant(1).find("\"taken\":1") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(the_queue_is_searched_once_for_each_grant_without_a_job) {
+    node.on_later(verb::delegate, "other"); // car2 does not offer it
+    submit("DELEGATE car1:other id=1");
+    grant(1);
+    const auto offered = queue.offered;
+    BOOST_TEST(offered == 1);
+    queue.waiting.clear();
+    submit("DELEGATE car1:work id=2");
+    queue.figures.service_time = 1us;
+    grant(1); // not worth it
+    BOOST_TEST(queue.offered == 2);
+    for (int i = 0; i < 10; ++i) {
+        sharing->on_change();
+    }
+    BOOST_TEST(queue.offered == 2);
+    queue.figures.service_time = 10ms;
+    submit("DELEGATE car1:work id=3");
+    sharing->on_change();
+    BOOST_TEST(queue.moved.size() == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(a_job_moves_if_the_wait_that_it_saves_is_worth_the_transfer) {
@@ -186,6 +286,63 @@ BOOST_AUTO_TEST_CASE(the_transfer_is_measured) {
     submit("DELEGATE car1:work id=50");
     submit("DELEGATE car1:work id=51");
     BOOST_TEST(grant(2, "00000000000000ab").find("\"taken\":0") != std::string::npos);
+    node.pass(1s); // it may have been a long job
+    BOOST_TEST(grant(2, "00000000000000ac").find("\"taken\":2") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(the_transfer_is_not_measured_if_the_other_node_does_not_know_how_long_a_job_takes) {
+    submit_jobs(1);
+    grant(1);
+    node.pass(60ms);
+    sent().answers("{}");
+    submit("DELEGATE car1:work id=50");
+    BOOST_TEST(grant(1, "00000000000000ab").find("\"taken\":1") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(the_first_job_tells_how_long_a_node_takes_that_does_not_know_it) {
+    submit_jobs(1);
+    grant(1); // without "service_us"
+    node.pass(40ms);
+    sent().reply.release()->offer_granted("{}", 0xbb);
+    submit("DELEGATE car1:work id=50"); // it waits for 5 ms
+    sharing->on_change();
+    BOOST_TEST(queue.moved.empty());
+    for (int id = 51; id <= 54; ++id) {
+        submit("DELEGATE car1:work id=" + std::to_string(id));
+    }
+    sharing->on_change();
+    BOOST_TEST(queue.moved.size() == 1U); // one that waits for 35 ms: the node is slower by 30 ms, and 1.5 ms
+}
+
+BOOST_AUTO_TEST_CASE(a_grant_is_used_for_50_ms_less_a_round_trip) {
+    const auto told = [&](int id) -> cles::test::recorded_next_hop::sent& {
+        submit("DELEGATE car1:work id=" + std::to_string(id));
+        sharing->on_change();
+        queue.waiting.clear();
+        BOOST_TEST_REQUIRE(sent().text.starts_with("PUSH car2:cles/slots"));
+        return sent();
+    };
+    auto& first = told(1);
+    node.pass(20ms);
+    first.answers("{}");
+    grant(1);
+    node.pass(30ms);
+    submit("DELEGATE car1:work id=2");
+    sharing->on_change();
+    BOOST_TEST(queue.moved.empty());
+    grant(1);
+    BOOST_TEST(queue.moved.empty()); // 10 ms of work, and a trip of 20
+    queue.figures.service_time = 100ms;
+    node.pass(29ms);
+    BOOST_TEST(grant(1).find("\"taken\":1") != std::string::npos);
+    queue.waiting.clear();
+    // None arrives in time.
+    node.pass(1s);
+    told(3).fails(errc::deadline, "no reply");
+    grant(1);
+    submit("DELEGATE car1:work id=4");
+    sharing->on_change();
+    BOOST_TEST(queue.moved.size() == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(jobs_that_come_later_use_the_rest_of_a_grant) {
@@ -239,6 +396,57 @@ BOOST_AUTO_TEST_CASE(waiting_jobs_are_reported_every_50_ms) {
     queue.waiting.clear();
     node.pass(50ms);
     BOOST_TEST(ways.count() == count + 1);
+}
+
+BOOST_AUTO_TEST_CASE(jobs_that_cannot_move_are_not_reported) {
+    submit("DELEGATE car1:work id=1 hops=0");
+    const auto before = ways.count();
+    sharing->on_change();
+    BOOST_TEST(ways.count() == before);
+    submit("DELEGATE car1:work id=2");
+    sharing->on_change();
+    BOOST_TEST(sent().text == "PUSH car2:cles/slots {\"node\":\"car1\",\"waiting\":1}");
+}
+
+BOOST_AUTO_TEST_CASE(a_node_for_which_no_job_is_is_told_again_when_more_have_come) {
+    node.on_later(verb::delegate, "other"); // car2 does not offer it
+    submit("DELEGATE car1:other id=1");
+    sharing->on_change();
+    BOOST_TEST(sent().text.starts_with("PUSH car2:cles/slots"));
+    grant(1);
+    const auto before = ways.count();
+    node.pass(50ms);
+    node.pass(50ms);
+    BOOST_TEST(ways.count() == before);
+    submit("DELEGATE car1:work id=2");
+    node.pass(50ms);
+    BOOST_TEST(ways.count() == before + 1);
+    // Or after a while: rights and tasks change.
+    queue.waiting.pop_back();
+    grant(1);
+    node.pass(450ms);
+    BOOST_TEST(ways.count() == before + 1);
+    node.pass(50ms);
+    BOOST_TEST(ways.count() == before + 2);
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_does_not_share_is_left_alone) {
+    submit_jobs(1);
+    sharing->on_change();
+    sent().refuses(R"({"error":"no_task","message":"car2 has no PUSH 'cles/slots'"})");
+    const auto before = ways.count();
+    node.pass(10s);
+    submit("DELEGATE car1:work id=2");
+    sharing->on_change();
+    BOOST_TEST(ways.count() == before);
+    queue.waiting.clear();
+    queue.figures.idle = 1;
+    hear("car2", "of car2", {.queued = 7, .workers = 1});
+    node.pass(1s);
+    sharing->on_change();
+    BOOST_TEST(counts().grants_sent == 0U);
+    link.ask(R"(PUSH self:cles/slots id=901 {"node":"car2","waiting":3})"); // it does now
+    BOOST_TEST(counts().grants_sent == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(free_nodes_are_told_first_and_eight_at_most) {
@@ -336,6 +544,48 @@ BOOST_AUTO_TEST_CASE(the_reply_to_a_job_grants_another_slot) {
     BOOST_TEST(link.take() == "id=31 {}\n");
 }
 
+BOOST_AUTO_TEST_CASE(the_next_slot_is_for_the_node_with_the_most_jobs) {
+    offer("car3", task("DELEGATE", "work"), {.workers = 1});
+    forwarded_job(give_grant());
+    queue.figures.idle = 0;
+    sent().answers(R"({"taken":1,"waiting":2})");
+    link.ask(R"(PUSH self:cles/slots id=902 {"node":"car3","waiting":3})");
+    node.started.at(0)->call->done("{}");
+    BOOST_TEST(link.take() == "id=30 {}\n");
+    queue.figures.idle = 1;
+    sharing->on_change();
+    BOOST_TEST(!granted_to("car3").empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_stops_grants_nothing) {
+    const auto number = give_grant();
+    forwarded_job(number);
+    queue.figures.draining = true;
+    node.started.at(0)->call->done("{}");
+    BOOST_TEST(link.take() == "id=30 {}\n");
+    link.ask(R"(PUSH self:cles/slots id=902 {"node":"car2","waiting":3})");
+    BOOST_TEST(counts().grants_sent == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(each_grant_is_settled_by_its_own_reply) {
+    queue.figures.idle = 1;
+    link.ask(R"(PUSH self:cles/slots id=901 {"node":"car2","waiting":1})");
+    auto& first = sent();
+    const auto number = granted_to("car2");
+    forwarded_job(number);
+    link.ask(R"(PUSH self:cles/slots id=902 {"node":"car2","waiting":1})");
+    BOOST_TEST(granted_to("car2") == number); // one more slot
+    auto& second = sent();
+    BOOST_TEST((&second != &first));
+    first.answers(R"({"taken":1,"waiting":0})");
+    BOOST_TEST(counts().grants_sent == 2U);
+    link.ask(R"(PUSH self:cles/slots id=903 {"node":"car2","waiting":1})");
+    BOOST_TEST(counts().grants_sent == 2U); // the second is still reserved
+    second.answers(R"({"taken":0,"waiting":0})");
+    link.ask(R"(PUSH self:cles/slots id=904 {"node":"car2","waiting":1})");
+    BOOST_TEST(counts().grants_sent == 3U);
+}
+
 BOOST_AUTO_TEST_CASE(slots_that_are_not_reserved_are_granted_to_others_too) {
     offer("car3", task("DELEGATE", "work"), {.workers = 1});
     const auto first = give_grant();
@@ -353,6 +603,7 @@ BOOST_AUTO_TEST_CASE(a_job_on_a_grant_runs) {
     BOOST_TEST(forwarded_job(number).empty());
     BOOST_TEST(node.started.size() == 1U);
     BOOST_TEST(node.started.at(0)->call->movable() == nullptr); // it moves once
+    BOOST_TEST(counts().jobs_moved_in == 0U);                   // until it has ended
     node.started.at(0)->call->done("{\"x\":1}");
     BOOST_TEST(link.take().ends_with(" {\"x\":1}\n"));
     BOOST_TEST(counts().jobs_moved_in == 1U);
@@ -371,9 +622,63 @@ BOOST_AUTO_TEST_CASE(a_job_without_a_valid_grant_is_refused) {
     }();
     node.pass(50ms);
     BOOST_TEST(code_of(forwarded_job(second, "car2", 32)) == "busy"); // late
-    BOOST_TEST(counts().grants_refused == 4U);
-    BOOST_TEST(counts().jobs_moved_in == 1U);
+    BOOST_TEST(counts().granted_jobs_refused == 4U);
     BOOST_TEST(node.started.size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(why_a_job_is_refused_is_said) {
+    const auto number = give_grant();
+    BOOST_TEST(link.ask("DELEGATE car1:work id=30 via=recon grant=00000000000000ff") ==
+               R"(id=30 {"error":"denied","message":"car1 has not granted 00000000000000ff to recon"})"
+               "\n");
+    queue.figures.idle = 0;
+    BOOST_TEST(forwarded_job(number) ==
+               R"(id=30 {"error":"busy","message":"car1 has no free worker any more","retry_ms":1})"
+               "\n");
+}
+
+BOOST_AUTO_TEST_CASE(a_job_that_has_moved_does_not_move_again) {
+    const auto number = give_grant();
+    link.ask("DELEGATE car1:work id=30 via=car2 grant=" + number); // without hops=0
+    BOOST_TEST(node.started.at(0)->call->movable() == nullptr);
+}
+
+BOOST_AUTO_TEST_CASE(jobs_of_tasks_that_stay_are_refused) {
+    int began = 0;
+    const auto start = [&](const cles::request&, const auto&) { ++began; };
+    node.host->tasks.add(verb::delegate, "own", {.info = {.local = true}, .start = start});
+    node.host->tasks.add(verb::delegate, "safe", {.info = {.must_be_signed = true}, .start = start});
+    const auto number = give_grant();
+    BOOST_TEST(link.ask("DELEGATE car1:own id=30 hops=0 via=car2 grant=" + number) ==
+               R"(id=30 {"error":"no_task","message":"car1 takes no jobs of 'own' from other nodes"})"
+               "\n");
+    BOOST_TEST(code_of(link.ask("DELEGATE car1:safe id=31 hops=0 via=car2 grant=" + number)) == "denied");
+    BOOST_TEST(began == 0);
+    BOOST_TEST(forwarded_job(number, "car2", 32).empty()); // the slot has not been used
+}
+
+BOOST_AUTO_TEST_CASE(only_a_job_on_a_valid_grant_gets_another) {
+    node.on_later(verb::push, "set");
+    link.ask("PUSH car1:set id=5 via=car9 grant=00000000000000aa {}");
+    node.started.back()->call->done("{}");
+    BOOST_TEST(link.take() == "id=5 {}\n");
+    link.ask("PUSH car1:set id=6 via=car9 grant=00000000000000aa {}");
+    node.started.back()->call->fail({.code = errc::busy, .message = "full"});
+    link.ask("DELEGATE car2:work id=7 via=car9 grant=00000000000000aa");
+    sent().answers("{}");
+    BOOST_TEST(link.take().ends_with("id=7 {}\n"));
+    link.ask("DELEGATE car2:work id=8 via=car9 grant=00000000000000aa");
+    sent().refuses(R"({"error":"busy","message":"full"})");
+    BOOST_TEST(counts().grants_sent == 0U);
+    BOOST_TEST(counts().jobs_moved_in == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(messages_are_not_counted_as_requests_of_programs) {
+    link.ask(R"(PUSH self:cles/slots id=901 {"node":"car2","waiting":0})");
+    link.ask(R"(PUSH self:cles/slots id=902 {"node":"nobody","waiting":0})");
+    BOOST_TEST(counts().requests[static_cast<std::size_t>(verb::push)] == 0U);
+    BOOST_TEST(counts().housekeeping == 2U);
+    BOOST_TEST(counts().errors == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(its_own_jobs_go_first) {
@@ -432,6 +737,16 @@ BOOST_AUTO_TEST_CASE(malformed_messages_are_refused) {
     BOOST_TEST(counts().grants_received == 0U);
 }
 
+BOOST_AUTO_TEST_CASE(only_neighbours_take_part) {
+    far.insert("car2");
+    submit_jobs(1);
+    BOOST_TEST(code_of(grant(1)) == "bad_request");
+    BOOST_TEST(code_of(link.ask(R"(PUSH self:cles/slots id=901 {"node":"car2","waiting":3})")) == "bad_request");
+    const auto before = ways.count();
+    sharing->on_change();
+    BOOST_TEST(ways.count() == before);
+}
+
 BOOST_AUTO_TEST_CASE(a_node_that_does_not_share_takes_no_part) {
     sharing->withdraw_all();
     sharing.reset();
@@ -446,6 +761,93 @@ BOOST_AUTO_TEST_CASE(nothing_is_reported_after_its_end) {
     sharing->withdraw_all();
     BOOST_TEST(job.cancelled);
     BOOST_TEST(queue.ended == 0);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+// -- a secured fleet -------------------------------------------------------------------------------------------------
+
+namespace work_sharing_secured {
+namespace {
+
+struct security_of_fixture {
+    std::shared_ptr<cles::test::scripted_security> security = std::make_shared<cles::test::scripted_security>();
+};
+
+/// sat1 submits jobs to car1, which may forward for all.
+struct fixture : security_of_fixture, cles::test::sharing_fixture {
+    fixture() : sharing_fixture(security, "sat1") {}
+
+    std::string granted(unsigned slots) {
+        return car2.ask(R"(PUSH self:cles/slots id=900 grant=00000000000000aa {"node":"car2","free":)" +
+                        std::to_string(slots) + "}");
+    }
+    /// car1 has granted car2 a slot. Returns the number of the grant.
+    std::string give_grant() {
+        queue.figures.idle = 1;
+        car2.ask(R"(PUSH self:cles/slots id=901 {"node":"car2","waiting":3})");
+        return granted_to("car2");
+    }
+
+    cles::test::test_link car2{node, "car2"};
+    cles::test::test_link car3{node, "car3"};
+};
+
+} // namespace
+} // namespace work_sharing_secured
+
+BOOST_FIXTURE_TEST_SUITE(work_sharing_secured, fixture)
+
+BOOST_AUTO_TEST_CASE(a_job_moves_with_the_name_of_its_requester) {
+    submit("DELEGATE car1:work/1 id=1");
+    BOOST_TEST(granted(1) == "id=900 {\"taken\":1,\"waiting\":0}\n");
+    BOOST_TEST(sent().text == "DELEGATE car2:work/1 hops=0 via=car1 from=sat1 grant=00000000000000aa {}");
+}
+
+BOOST_AUTO_TEST_CASE(jobs_stay_if_the_node_may_not_forward_for_their_requester) {
+    security->forwarders = {};
+    submit("DELEGATE car1:work/1 id=1");
+    cles::test::test_link own{node, "car1"};
+    own.ask("DELEGATE car1:work/2 id=2");
+    queue.waiting.push_back({node.started.back()->call, "{}", 0});
+    BOOST_TEST(granted(2) == "id=900 {\"taken\":1,\"waiting\":0}\n");
+    BOOST_TEST(sent().text == "DELEGATE car2:work/2 hops=0 via=car1 grant=00000000000000aa {}"); // its own
+}
+
+BOOST_AUTO_TEST_CASE(jobs_stay_that_their_requester_may_not_send_to_the_other_node) {
+    security->denied = {"sat1 DELEGATE car2:work/1"};
+    submit("DELEGATE car1:work/1 id=1");
+    submit("DELEGATE car1:work/2 id=2");
+    BOOST_TEST(granted(2).starts_with("id=900 {\"taken\":1"));
+    BOOST_TEST(sent().text.starts_with("DELEGATE car2:work/2"));
+}
+
+BOOST_AUTO_TEST_CASE(a_node_grants_in_its_own_name_only) {
+    submit("DELEGATE car1:work id=1");
+    BOOST_TEST(car3.kind(R"(PUSH self:cles/slots id=900 grant=00000000000000aa {"node":"car2","free":1})") ==
+               "id=900 denied");
+    BOOST_TEST(car3.kind(R"(PUSH self:cles/slots id=901 {"node":"car2","waiting":1})") == "id=901 denied");
+    BOOST_TEST(queue.moved.empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_grant_is_only_for_the_peer) {
+    const auto number = give_grant();
+    BOOST_TEST(car3.kind("DELEGATE car1:work id=30 hops=0 via=car2 grant=" + number) == "id=30 denied");
+    BOOST_TEST(car2.kind("DELEGATE car1:work id=31 hops=0 via=car3 grant=" + number) == "id=31 denied");
+    BOOST_TEST(node.started.empty());
+    BOOST_TEST(counts().granted_jobs_refused == 2U);
+    BOOST_TEST(car2.kind("DELEGATE car1:work id=32 hops=0 via=car2 grant=" + number).empty());
+    BOOST_TEST(node.started.size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(the_rights_of_the_requester_apply_where_the_job_runs) {
+    security->forwarders = {"car1", "car2"};
+    security->denied = {"sat1 DELEGATE car1:work"};
+    const auto number = give_grant();
+    BOOST_TEST(car2.kind("DELEGATE car1:work id=30 hops=0 via=car2 from=sat1 grant=" + number) == "id=30 denied");
+    BOOST_TEST(node.started.empty());
+    BOOST_TEST(car2.kind("DELEGATE car1:work id=31 hops=0 via=car2 from=car3 grant=" + number).empty());
+    BOOST_TEST(node.started.size() == 1U);
 }
 
 BOOST_AUTO_TEST_SUITE_END()
