@@ -58,6 +58,35 @@ BOOST_FIXTURE_TEST_CASE(bridges_find_each_other_and_learn_names, two_pools) {
     BOOST_TEST(hub.core().pool_of("new", nats.now()) == "north");
 }
 
+BOOST_AUTO_TEST_CASE(a_name_with_a_dot_is_no_pool_that_does_not_appear) {
+    simulated_nats nats{1};
+    site hub{nats, "south", "hub"};
+    site gate{nats, "north", "gate.two"};
+    hub.connect();
+    BOOST_TEST(hub.core().pool_of("gate.two", nats.now()) == "gate"); // until others have answered
+    const auto before = hub.pools_changed;
+    nats.run_for(2s);
+    BOOST_TEST(hub.pools_changed == before + 1); // the node asks again
+    BOOST_TEST(hub.core().pool_of("gate.two", nats.now()).empty());
+    gate.connect();
+    nats.run_for(500ms);
+    BOOST_TEST(hub.core().pool_of("gate.two", nats.now()) == "north");
+    BOOST_TEST(gate.core().pool_of("hub", nats.now()) == "south");
+    BOOST_TEST(gate.core().pool_of("gate.two", nats.now()) == "gate"); // just connected; at home, the node knows it
+}
+
+BOOST_FIXTURE_TEST_CASE(a_heartbeat_measures_the_way_to_the_server_and_back, two_pools) {
+    BOOST_TEST(hub.core().round_trip().has_value());
+    nats.impair().longest_delay = 20ms;
+    nats.run_for(2s);
+    BOOST_TEST((hub.core().round_trip() > 0ms && hub.core().round_trip() <= 20ms));
+    nats.lose = [](const std::string& subject, const std::string&) { return subject.starts_with("cles.south.beat"); };
+    hub.disconnect();
+    hub.connect();
+    nats.run_for(2s);
+    BOOST_TEST(!hub.core().round_trip().has_value());
+}
+
 BOOST_FIXTURE_TEST_CASE(a_request_crosses, two_pools) {
     const auto id = hub.ask("north", "PUSH north.car9:echo/fast deadline=900 hops=7 via=hub {\"n\":1}");
     nats.run_for(1ms);
@@ -237,6 +266,11 @@ BOOST_FIXTURE_TEST_CASE(within_its_own_pool_a_qualified_name_works, two_pools) {
     nats.run_for(10ms);
     BOOST_TEST(hub.answer(id) == "{\"n\":1}");
     BOOST_TEST(hub.executed["{\"n\":1}"] == 1);
+    // The node would take its own name in `via` for a loop.
+    const auto self = hub.ask("south", "PUSH south.hub:echo via=hub {\"n\":2}");
+    nats.run_for(10ms);
+    BOOST_TEST(hub.answer(self) == "{\"n\":2}");
+    BOOST_TEST(nats.recorded("cles.south.push.hub")[0] == "cles.south.push.hub.echo  {\"n\":2}");
 }
 
 BOOST_FIXTURE_TEST_CASE(programs_that_use_nats_are_served, two_pools) {

@@ -29,8 +29,12 @@ BOOST_AUTO_TEST_CASE(the_message_is_the_rest_of_the_line) {
     BOOST_TEST(message_of(parsed("PUSH car1:speed x=1 id=7  {\"a\": 1}"), "south") == " x=1 {\"a\": 1}");
 }
 
-BOOST_AUTO_TEST_CASE(within_a_pool_via_remains) {
+BOOST_AUTO_TEST_CASE(what_a_bridge_passes_on_keeps_via) {
     BOOST_TEST(message_of(parsed("PULL car1:speed via=hub"), {}) == " via=hub");
+}
+
+BOOST_AUTO_TEST_CASE(within_a_pool_via_is_left_out) {
+    BOOST_TEST(message_within_pool(parsed("PUSH car1:speed/fast id=7 via=hub x=1 {}")) == "/fast x=1 {}");
 }
 
 BOOST_AUTO_TEST_CASE(a_long_name_in_via_is_cut) {

@@ -100,6 +100,7 @@ class site final : public bridge_output {
     std::set<std::string> bound;                               ///< nouns that the bridge has bound at the node
     std::vector<std::string> lost; ///< what was lost: "to_pool north", "bindings north", "all"
     std::vector<std::string> logged;
+    int pools_changed = 0;
 
   private:
     bool publish(std::string subject, std::string reply, std::string message) override;
@@ -109,7 +110,7 @@ class site final : public bridge_output {
     void lose_pool(std::string_view pool, std::string_view why) override;
     void lose_all(std::string_view why) override;
     void lose_bindings(std::string_view pool, std::string_view why) override;
-    void on_pools_changed() override {}
+    void on_pools_changed() override { ++pools_changed; }
     [[nodiscard]] std::vector<std::string> home_names() const override { return names; }
     void log(log_level level, const std::string& text) override;
 

@@ -55,6 +55,7 @@ void bridge::on_connected(std::uint64_t drawn, std::size_t max_message, time_poi
     now_ = now;
     connected_ = true;
     connected_at_ = now;
+    pools_may_appear_ = true;
     constexpr std::size_t around = 256; // the part of a line that is not in the message
     max_message_ = std::min(max_message, setup_.max_line - std::min(around, setup_.max_line));
     replaced_ = std::exchange(self_.instance, instance_text(drawn));
@@ -69,6 +70,7 @@ void bridge::on_connected(std::uint64_t drawn, std::size_t max_message, time_poi
         }
     }
     home_ = names_of(out_.home_names());
+    round_trip_.reset();
     send_heartbeat(true);
     due_ = next_heartbeat_;
 }
@@ -111,6 +113,10 @@ void bridge::on_time(time_point now) {
     if (auto names = names_of(out_.home_names()); names.digest != home_.digest) {
         home_ = std::move(names);
         next_heartbeat_ = std::min(next_heartbeat_, now + soon);
+    }
+    if (pools_may_appear_ && connected_at_ + optimistic <= now) { // names may mean another pool now
+        pools_may_appear_ = false;
+        out_.on_pools_changed();
     }
     if (names_wanted_ && next_names_ <= now) {
         send_names();
@@ -190,12 +196,16 @@ void bridge::send_heartbeat(bool starting) {
     if (!leaving_) {
         pools_.on_heartbeat(self_, said, now_); // so that `publisher_of` considers it
     }
+    heartbeat_sent_ = now_;
     out_.publish(heartbeat_subject(self_), {}, text_of(said));
 }
 
 void bridge::on_heartbeat(const subject& from, std::string_view message, time_point now) {
     const auto id = from.bridge();
     if (id == self_) {
+        if (const auto sent = std::exchange(heartbeat_sent_, {})) {
+            round_trip_ = now - *sent;
+        }
         return;
     }
     const auto said = parse_heartbeat(message);
@@ -350,14 +360,15 @@ void bridge::check_own_pool(time_point now) {
 
 std::string bridge::pool_of(std::string_view target, time_point now) const {
     const auto dot = target.find('.');
-    if (dot != std::string_view::npos && dot + 1 < target.size()) {
-        const auto first = target.substr(0, dot);
-        const bool may_appear = !connected_ || connected_at_ + optimistic > now;
-        if (first == setup_.pool || pools_.is_known(first) || (may_appear && is_pool_name(first))) {
-            return std::string{first};
-        }
+    const auto first = dot != std::string_view::npos && dot + 1 < target.size() ? target.substr(0, dot) : "";
+    if (!first.empty() && (first == setup_.pool || pools_.is_known(first))) {
+        return std::string{first};
     }
-    return std::string{pools_.pool_of(target, setup_.pool)};
+    if (const auto found = pools_.pool_of(target, setup_.pool); !found.empty()) {
+        return std::string{found};
+    }
+    const bool may_appear = !connected_ || connected_at_ + optimistic > now;
+    return may_appear && is_pool_name(first) ? std::string{first} : std::string{};
 }
 
 void bridge::on_line(const bridge_link& from, std::string_view line, time_point now) {
@@ -449,7 +460,7 @@ void bridge::send_request(const bridge_link& from, std::string_view line, time_p
 void bridge::publish_request(const bridge_link& from, const protocol::request_line& r, time_point now) {
     const auto& pool = from.pool;
     const auto number = sent_.add(from, r.id, now + milliseconds{r.deadline_ms}, now);
-    auto message = message_of(r, pool == setup_.pool ? std::string_view{} : setup_.pool);
+    auto message = pool == setup_.pool ? message_within_pool(r) : message_of(r, setup_.pool);
     if (message.size() > max_message_) {
         sent_.on_message(number, failure_text({.code = errc::too_large,
                                                .message = "a request through NATS has at most " +

@@ -108,6 +108,9 @@ class bridge final : private sent_requests_events {
     [[nodiscard]] bool is_connected() const noexcept { return connected_; }
     [[nodiscard]] const pool_table& pools() const noexcept { return pools_; }
     [[nodiscard]] const figures& counted() const noexcept { return figures_; }
+    /// How long the last own heartbeat took to the server and back. Nothing if none has come back since the connection
+    /// was made: it may not be permitted to publish or receive heartbeats.
+    [[nodiscard]] std::optional<time_point::duration> round_trip() const noexcept { return round_trip_; }
     [[nodiscard]] const bridge_id& self() const noexcept { return self_; }
 
   private:
@@ -158,9 +161,12 @@ class bridge final : private sent_requests_events {
     bool connected_ = false;
     bool leaving_ = false;
     time_point connected_at_{};
+    bool pools_may_appear_ = false; // names with their prefix are taken for theirs
     time_point now_{};
     time_point due_{time_point::max()};
     time_point next_heartbeat_{};
+    std::optional<time_point> heartbeat_sent_; // nothing: it has come back
+    std::optional<time_point::duration> round_trip_;
     time_point next_names_{};
     time_point next_drop_log_{};
     bool names_wanted_ = false;

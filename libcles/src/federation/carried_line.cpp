@@ -4,21 +4,23 @@
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
+#include <optional>
 
 namespace cles::bridging {
 namespace {
 
-// Appends the adverbs, without `id`, and the body.
-void append_rest(std::string& out, const protocol::request_line& r, std::string_view home) {
+// Appends the adverbs, without `id`, and the body. \param home of the names in `via`; nothing: `via` is left out
+void append_rest(std::string& out, const protocol::request_line& r, std::optional<std::string_view> home) {
     protocol::part_reader parts{r.text};
     parts.next(); // verb
     parts.next(); // noun
     for (auto part = parts.next(); !part.empty(); part = parts.next()) {
-        if (part.starts_with("id=")) {
+        const bool is_via = part.starts_with("via=");
+        if (part.starts_with("id=") || (is_via && !home)) {
             continue;
         }
         out.push_back(' ');
-        if (home.empty() || !part.starts_with("via=")) {
+        if (!is_via || home->empty()) {
             out.append(part);
             continue;
         }
@@ -26,7 +28,7 @@ void append_rest(std::string& out, const protocol::request_line& r, std::string_
         for (auto left = r.via; !left.empty();) {
             const auto comma = left.find(',');
             const auto from = out.size();
-            out.append(home).append(".").append(left.substr(0, comma));
+            out.append(*home).append(".").append(left.substr(0, comma));
             out.resize(std::min(out.size(), from + protocol::max_name)); // the pool is what ends loops
             left.remove_prefix(comma == std::string_view::npos ? left.size() : comma + 1);
             if (!left.empty()) {
@@ -47,11 +49,17 @@ std::string message_of(const protocol::request_line& request, std::string_view h
     return made;
 }
 
+std::string message_within_pool(const protocol::request_line& request) {
+    std::string made{request.noun.path.substr(request.noun.task.size())};
+    append_rest(made, request, {});
+    return made;
+}
+
 std::string line_of(const protocol::request_line& request, std::uint64_t id) {
     std::string made{to_string(request.verb)};
     made.append(" ").append(request.noun.target).append(":").append(request.noun.path);
     made.append(" id=").append(std::to_string(id));
-    append_rest(made, request, {});
+    append_rest(made, request, std::string_view{});
     return made;
 }
 

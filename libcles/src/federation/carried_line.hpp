@@ -17,6 +17,9 @@ namespace cles::bridging {
 /// The message for a request, after its task: " deadline=900 via=south.hub {...}", or "/fast deadline=900 ...".
 /// \param home the pool that the nodes in `via` belong to; empty: they remain as they are
 std::string message_of(const protocol::request_line& request, std::string_view home);
+/// The same within the own pool: without `via`, because the request may lead to nodes that have forwarded it to the
+/// bridge, or to the bridge itself.
+std::string message_within_pool(const protocol::request_line& request);
 
 /// The line of a request without LF, with that id.
 /// \param text the request, with or without an id of its own

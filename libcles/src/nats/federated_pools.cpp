@@ -479,6 +479,10 @@ void federated_pools::write_metrics(json_writer& w) const {
     w.value(std::string_view{options_.pool});
     w.key("connected");
     w.value(bridge_ && bridge_->is_connected());
+    if (!last_problem_.empty()) {
+        w.key("problem");
+        w.value(std::string_view{last_problem_});
+    }
     if (bridge_) {
         w.key("pools");
         w.begin_array();
@@ -497,6 +501,10 @@ void federated_pools::write_metrics(json_writer& w) const {
             }
         }
         w.end_array();
+        if (const auto took = bridge_->is_connected() ? bridge_->round_trip() : std::nullopt) {
+            w.key("round_trip_us");
+            w.value(static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(*took).count()));
+        }
         const auto& f = bridge_->counted();
         for (const auto& [key, value] :
              {std::pair{"bridges", std::uint64_t{bridge_->pools().bridge_count()}},

@@ -25,7 +25,7 @@ constexpr std::int64_t connect_timeout = 1'000; // milliseconds, of one server
 constexpr std::int64_t ping_interval = 2'000;   // milliseconds
 constexpr int max_pings_out = 2;
 constexpr milliseconds first_pause{250};
-constexpr milliseconds longest_pause{8'000};
+constexpr milliseconds longest_pause{1'000};
 constexpr milliseconds flush_at_end{200};
 constexpr int most_buffered = 1 << 20; // bytes that the library holds; more wait here
 

@@ -49,7 +49,7 @@ struct node_options {
     std::shared_ptr<node_security> security{}; ///< null: the node is not secured
     /// Creates what a secured node says; null only without `security`.
     std::unique_ptr<security_protocol> (*secured)(node_state& host) = nullptr;
-    other_pools* pools = nullptr; ///< owned by `metrics`; null: the node reaches its own pool only
+    other_pools* pools = nullptr;                  ///< owned by `metrics`; null: the node reaches its own pool only
     const detail::tracing_part* tracing = nullptr; ///< null: nothing is recorded of traced requests
     log_sink log{};
     std::function<void(json_writer&)> metrics{}; ///< metrics of the program
