@@ -71,7 +71,7 @@ asio::awaitable<void> show_pools(client& requester, const std::vector<listed_nod
             note(printable(nodes[i].node) + ": " + printable(answers[i].error));
             continue;
         }
-        for (auto& each : pools_in(nodes[i].node, answers[i].json)) {
+        for (auto& each : pools_in(nodes[i].node, parse_json(answers[i].json))) {
             pools.push_back(std::move(each));
         }
     }

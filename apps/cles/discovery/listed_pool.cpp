@@ -17,10 +17,9 @@ std::string text_at(const json_node& of, std::string_view name) {
 
 } // namespace
 
-std::vector<listed_pool> pools_in(std::string_view node, std::string_view metrics) {
+std::vector<listed_pool> pools_in(std::string_view node, const json_node& metrics) {
     std::vector<listed_pool> out;
-    const auto all = parse_json(metrics);
-    const auto* const federation = all.find("federation");
+    const auto* const federation = metrics.find("federation");
     if (federation == nullptr) {
         return out;
     }

@@ -5,11 +5,9 @@
 #include <string_view>
 #include <vector>
 
-namespace cles {
-class json_writer;
-}
-
 namespace tool {
+
+struct json_node;
 
 /// Another pool, as a bridge knows it (docs/federation.md).
 struct listed_pool {
@@ -21,8 +19,7 @@ struct listed_pool {
 };
 
 /// From the answer of a node to PULL self:cles/metrics; empty if it is not a bridge.
-/// \throws cles::error with `conversion`
-std::vector<listed_pool> pools_in(std::string_view node, std::string_view metrics);
+std::vector<listed_pool> pools_in(std::string_view node, const json_node& metrics);
 
 std::string pools_table(const std::vector<listed_pool>& pools);
 /// {"pools":[{"bridge":"hub","pool":"north","state":"live","bridges":1,"nodes":3}]}
