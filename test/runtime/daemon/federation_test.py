@@ -3,8 +3,10 @@
 """Daemons of two pools reach each other through a NATS server, which may refuse, restart, or carry anything else."""
 
 import json
+import signal
 import time
 import unittest
+from pathlib import Path
 
 from daemon import DEFAULTS, PLUGINS, Daemon, Folder, body, clesd
 from fleet import COUNTING
@@ -18,6 +20,14 @@ def pool_of(daemon):
     return {**found, "pools": sum(pool["state"] == "live" for pool in found.get("pools", []))}
 
 
+def is_stopped(process):
+    """Whether all its threads are."""
+    states = []
+    for stat in Path(f"/proc/{process}/task").glob("*/stat"):
+        states.append(stat.read_text().rpartition(")")[2].split()[0])
+    return set(states) == {"T"}
+
+
 class Federation(unittest.TestCase):
     def setUp(self):
         self.folder = Folder()
@@ -29,12 +39,12 @@ class Federation(unittest.TestCase):
         self.addCleanup(server.__exit__)
         return server
 
-    def node(self, name, pool, server, more="", federation="", has_work=True):
+    def node(self, name, pool, server, more="", federation="", has_work=True, url=None):
         """A daemon with the tasks of the plugin system, and usually of primes and counting, which is a bridge if there
         is a server."""
         work = f", {PLUGINS}/libcles-primes.so, {{path: {COUNTING}, config: {{marks: {self.marks}}}}}" if has_work else ""
         plugins = f"plugins: [{PLUGINS}/libcles-system.so{work}]\n"
-        bridge = f"federation: {{nats: '{server.url}', pool: {pool}{federation}}}\n" if server else f"pool: {pool}\n"
+        bridge = f"federation: {{nats: '{url or server.url}', pool: {pool}{federation}}}\n" if server else f"pool: {pool}\n"
         node = Daemon(plugins + bridge + "drain: 300ms\n" + more, base=DEFAULTS.replace("sat1", name))
         self.addCleanup(node.__exit__)
         return node
@@ -117,9 +127,11 @@ class Federation(unittest.TestCase):
         gate = self.node("gate", "north", server)
         self.wait_for_pools(hub, gate)
         with hub.connect() as link:
-            for number in (1, 2, 3):
+            for number in (1, 2):
                 link.send(f"DELEGATE hub:holds/{number} id={number} deadline=60000")
-            wait_until(lambda: self.count_marks(1) + self.count_marks(2) + self.count_marks(3) == 2, "no worker is free")
+                wait_until(lambda number=number: self.count_marks(number) == 1, "a worker runs it")
+            link.send("DELEGATE hub:holds/3 id=3 deadline=60000")
+            wait_until(lambda: json.loads(hub.ask("PULL self:cles/metrics"))["pool"]["queued"] == 1, "the queue is full")
             self.assertEqual(json.loads(hub.ask("DELEGATE hub:once/4/0"))["error"], "busy")
             self.assertEqual(json.loads(hub.ask("DELEGATE any:once/5/0")), {"value": "gate"})
         self.assertEqual(self.count_marks(5), 1)
@@ -156,8 +168,17 @@ class Federation(unittest.TestCase):
             for _ in range(3):
                 self.assertTrue(other.read().startswith("UPDATE north.gate:utc seq="))
             wait_until(lambda: pool_of(gate)["updates_sent"] >= 3, "updates are counted")
-            self.assertEqual(body(one.ask("BIND north.gate:nothing id=2"))["error"], "no_task")
+            one.send("BIND north.gate:nothing id=2")
+            self.assertEqual(body(self.reply_to(one, 2))["error"], "no_task")
         wait_until(lambda: pool_of(gate)["updates_sent"] == self.sent_a_while_ago(gate), "the binding has ended")
+
+    @staticmethod
+    def reply_to(link, number):
+        """Updates may precede it."""
+        while not (line := link.read()).startswith(f"id={number} "):
+            if not line.startswith("UPDATE "):
+                raise AssertionError(line)
+        return line
 
     def sent_a_while_ago(self, gate):
         sent = pool_of(gate)["updates_sent"]
@@ -195,9 +216,8 @@ class Federation(unittest.TestCase):
             self.assertIn("seconds", json.loads(hub.ask("PULL any:utc")))
             hub.wait_for_entry("cannot connect to NATS")
             server.start()
-            begun, started = time.monotonic(), time.time()
+            started = time.time()
             wait_until(lambda: "seconds" in json.loads(hub.ask("PULL north.gate:utc")), "it works again")
-            print(f"whole again {time.monotonic() - begun:.1f} s after the server's start")
             while body(link.read())["seconds"] < started:  # then it is bound again by itself
                 pass
         self.assertLess(sum("cannot connect to NATS" in e["message"] for e in hub.entries()), 3)
@@ -259,6 +279,109 @@ class Federation(unittest.TestCase):
         self.assertIn("seconds", json.loads(hub.ask("PULL north.gate:utc")))
         self.assertGreater(pool_of(gate)["messages_refused"], 0)
         self.assertLess(sum("dropped a message of NATS" in e["message"] for e in gate.entries()), 3)
+
+    def test_each_request_runs_once_however_many_bridges_there_are(self):
+        server, hub, gate = self.two_pools()
+        others = [self.node(name, "north", server, more=f"seeds: ['{gate.url}']\n") for name in ("other", "third")]
+        wait_until(lambda: pool_of(hub)["bridges"] == 4, "all bridges are known")
+        with hub.connect() as link:
+            for number in range(1, 301):
+                link.send(f"DELEGATE north.any:once/{number}/0 id={number} deadline=20000")
+            answers = [body(link.read()) for _ in range(300)]
+        self.assertEqual([a for a in answers if "error" in a], [])
+        marks = [line.split()[0] for line in self.folder.read("marks").splitlines()]
+        self.assertEqual(sorted(marks, key=int), [str(number) for number in range(1, 301)])
+        taken = [pool_of(node)["requests_taken"] for node in (gate, *others)]
+        self.assertEqual(sum(taken), 300)
+        self.assertNotIn(0, taken)  # the queue group gives some to each
+
+    def test_names_with_dots(self):
+        server = self.server()
+        hub, gate = self.node("hub.one", "south", server), self.node("gate.two", "north", server)
+        self.wait_for_pools(hub, gate)
+        with server.client() as client:
+            client.subscribe("cles.north.pull.*.*")
+            self.assertIn("seconds", json.loads(hub.ask("PULL north.gate.two:utc")))
+            self.assertEqual(client.read()[0], "cles.north.pull.gate%2Etwo.utc")
+        wait_until(lambda: "seconds" in json.loads(hub.ask("PULL gate.two:utc")), "its name is known")
+
+    def test_pools_in_via_end_loops(self):
+        server, _, _ = self.two_pools()
+        with server.client() as client:
+            reply = json.loads(client.request("cles.north.pull.gate.utc", " via=north.x,south.hub"))
+            self.assertEqual(reply["error"], "no_target")
+            self.assertIn("'via' form a loop", reply["message"])
+            self.assertIn("seconds", json.loads(client.request("cles.north.pull.gate.utc", " via=south.hub,west.y")))
+
+    def test_a_pool_that_does_not_answer_harms_no_other(self):
+        server, hub, gate = self.two_pools()
+        west = self.node("well", "west", server)
+        wait_until(lambda: pool_of(hub)["pools"] == 2, "all pools are known")
+        gate.send_signal(signal.SIGSTOP)
+        wait_until(lambda: is_stopped(gate.process.pid), "it is stopped")
+        try:
+            with hub.connect() as slow, hub.connect() as quick:
+                for number in range(1, 201):
+                    slow.send(f"DELEGATE north.gate:once/{number}/0 id={number} deadline=20000")
+                times = []
+                for number in range(1000, 1200):
+                    begun = time.monotonic()
+                    self.assertEqual(body(quick.ask(f"DELEGATE west.well:once/{number}/0 id=1"))["value"], "well")
+                    times.append(time.monotonic() - begun)
+                self.assertLess(sorted(times)[100], 0.5)
+                # All are answered long before their deadline, when the pool is taken for lost.
+                self.assertEqual({body(slow.read())["error"] for _ in range(200)}, {"unavailable"})
+                self.assertEqual(pool_of(hub)["pools"], 1)
+        finally:
+            gate.send_signal(signal.SIGCONT)
+        wait_until(lambda: "seconds" in json.loads(hub.ask("PULL north.gate:utc")), "it is found again")
+        self.assertEqual(len(set(self.folder.read("marks").splitlines())),
+                         len(self.folder.read("marks").splitlines()))
+        self.assertIsNotNone(west)
+
+    def test_top_shows_the_nodes_of_other_pools(self):
+        _, hub, _ = self.two_pools()
+        code, out, errors = cles("top", "--pools", "-n", "3", "-i", "1s", "--sort", "name", "--at", hub.url, "-o", "json")
+        self.assertEqual(code, 0, errors)
+        nodes = json.loads(out.splitlines()[-1])["nodes"]
+        self.assertEqual([node["node"] for node in nodes], ["hub", "north.gate"])
+        self.assertEqual([node["state"] for node in nodes], ["live", "live"])
+        self.assertIn("requests_per_s", nodes[1])
+        self.assertNotIn("failure", nodes[1])
+        _, out, _ = cles("top", "-n", "1", "--at", hub.url, "-o", "json")
+        self.assertEqual([node["node"] for node in json.loads(out)["nodes"]], ["hub"])
+
+    def diagnosis(self, node):
+        """What `cles doctor` finds about the node's connection to NATS, as verdict and text."""
+        _, out, _ = cles("doctor", "--at", node.url, "-o", "json")
+        return [(each["verdict"], each["text"]) for each in json.loads(out)["findings"] if each["check"] == "federation"]
+
+    def test_doctor_examines_the_connection(self):
+        server, hub, gate = self.two_pools()
+        wait_until(lambda: "round_trip_us" in pool_of(hub), "a heartbeat has come back")
+        (verdict, text), = self.diagnosis(hub)
+        self.assertEqual(verdict, "ok")
+        self.assertRegex(text, r"^hub reaches NATS and 1 other pool; a message takes \d+\.\d\d ms there and back$")
+        gate.process.kill()
+        wait_until(lambda: pool_of(hub)["pools"] == 0, "the loss is noticed")
+        self.assertEqual(self.diagnosis(hub)[1], ("warning", "hub cannot reach any bridge of: north"))
+        server.stop()
+        hub.wait_for_entry("cannot connect to NATS")
+        (verdict, text), = self.diagnosis(hub)
+        self.assertEqual(verdict, "failure")
+        self.assertRegex(text, "^hub is not connected to NATS: .+")
+
+    def test_doctor_names_what_nats_does_not_permit(self):
+        server = self.server('''authorization { users: [{user: u, password: p, permissions: {
+            subscribe: ["cles.south.*.*.*", "cles.south.bridge.>", "cles.*.names.*", "cles.*.feed.*.*"], publish: ["cles.>"]}}] }''')
+        hub = self.node("hub", "south", server, url=f"nats://u:p@127.0.0.1:{server.port}")
+        hub.wait_for_entry("ermission")
+        wait_until(lambda: pool_of(hub).get("connected"), "it is connected")
+        found = self.diagnosis(hub)
+        self.assertEqual([verdict for verdict, _ in found], ["warning", "warning"], found)
+        self.assertIn("NATS refuses a part of what hub does", found[0][1])
+        self.assertIn("beat", found[0][1])
+        self.assertIn("does not receive its own heartbeats", found[1][1])
 
     def test_configuration(self):
         for text, why in (
