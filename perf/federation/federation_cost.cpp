@@ -168,17 +168,17 @@ void serve_federated(const std::string& url, const cles::perf::child_process::an
 class federated_requester {
   public:
     explicit federated_requester(const std::string& url) : hub_(io_, bridge_options(url, "hub", "south")) {
-        bool works = false;
-        for (int attempt = 0; attempt < 50 && !works; ++attempt) {
-            hub_.async_pull<localization>(federated_noun, [&](boost::system::error_code code, const localization&) {
-                works = !code;
+        boost::system::error_code code;
+        for (int attempt = 0; attempt == 0 || (attempt < 50 && code); ++attempt) {
+            hub_.async_pull<localization>(federated_noun, [&](boost::system::error_code result, const localization&) {
+                code = result;
                 io_.stop();
             });
             io_.run();
             io_.restart();
         }
-        if (!works) {
-            throw std::runtime_error{"the other pool is not found"};
+        if (code) {
+            throw std::runtime_error{"the other pool is not found: " + code.message()};
         }
     }
 
