@@ -177,6 +177,7 @@ BOOST_FIXTURE_TEST_CASE(what_a_lost_bridge_took_is_unavailable, two_pools) {
     gate.answer_after = 60s;
     second.answer_after = 60s;
     std::vector<std::uint64_t> ids;
+    ids.reserve(20);
     for (int i = 0; i < 20; ++i) {
         ids.push_back(hub.ask("north", "DELEGATE car9:echo {\"n\":" + std::to_string(i) + "}"));
     }

@@ -282,7 +282,9 @@ void bridge::on_control(std::string_view reply, std::string_view message, time_p
     if ((from.kind != subject_kind::control && from.kind != subject_kind::reply) ||
         message.find('\n') != message.npos || !protocol::parse_request(message, r, wrong)) {
         drop(control_subject(self_), "it is not a message of a bridge");
-    } else if (r.verb == verb::bind && r.unbinds()) {
+        return;
+    }
+    if (r.verb == verb::bind && r.unbinds()) {
         std::string noun{r.noun.target};
         noun.append(":").append(r.noun.path);
         if (published_.unbind(noun, by)) {

@@ -86,7 +86,7 @@ class bridge final : private sent_requests_events {
     /// Connected to NATS, and not subscribed to anything. \param drawn at random \param max_message in bytes
     void on_connected(std::uint64_t drawn, std::size_t max_message, time_point now);
     void on_disconnected(std::string_view why);
-    void on_message(std::string_view subject, std::string_view reply, std::string_view message, time_point now);
+    void on_message(std::string_view where, std::string_view reply, std::string_view message, time_point now);
     /// The messages of one read have been passed, and the node has replied to those that it answers at once.
     void on_batch();
     /// To be called at `due`, and when the node's pool has changed.
@@ -135,7 +135,7 @@ class bridge final : private sent_requests_events {
     void cancel_taken(std::uint64_t id);
     void end_published(const std::string& noun);
     void refuse_foreign(const std::string& reply, const protocol::failure& why);
-    void drop(std::string_view subject, std::string_view why);
+    void drop(std::string_view where, std::string_view why);
     bool remember(const bridge_id& by);
 
     // Other bridges.

@@ -18,7 +18,7 @@ struct bridge_link {
     std::string pool{};
     std::uint32_t number = 0; ///< of links that the node opens, since it may need several to one pool
 
-    auto operator<=>(const bridge_link&) const = default;
+    auto operator<=>(const bridge_link&) const = default; // NOLINT(modernize-use-nullptr): not about pointers
 };
 
 } // namespace cles::bridging

@@ -24,7 +24,7 @@ struct foreign_noun {
     std::string target;     ///< the node as the binding names it: "car1" or "north.car1"
     std::uint32_t link = 0; ///< the number of the link on which it is bound
 
-    auto operator<=>(const foreign_noun&) const = default;
+    auto operator<=>(const foreign_noun&) const = default; // NOLINT(modernize-use-nullptr): not about pointers
     [[nodiscard]] std::string subject() const { return feed_subject(pool, node, task); }
 };
 

@@ -21,7 +21,7 @@ class published_nouns {
         bridge_id by;
         std::string reply; ///< the subject for the reply to BIND
 
-        auto operator<=>(const subscriber&) const = default;
+        auto operator<=>(const subscriber&) const = default; // NOLINT(modernize-use-nullptr): not about pointers
     };
     struct reply {
         std::vector<std::string> to; ///< subjects

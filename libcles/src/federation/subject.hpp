@@ -23,7 +23,7 @@ struct bridge_id {
     std::string pool;
     std::string instance; ///< 16 lower-case hexadecimal digits, drawn at random
 
-    auto operator<=>(const bridge_id&) const = default;
+    auto operator<=>(const bridge_id&) const = default; // NOLINT(modernize-use-nullptr): not about pointers
 };
 
 bool is_instance(std::string_view text) noexcept;

@@ -117,6 +117,7 @@ void federated_pools::listen(const asio::any_io_executor& executor, const limits
 
 void federated_pools::accept(std::function<void(link_ptr)> on_link) {
     on_link_ = std::move(on_link);
+    work_.emplace(executor_);
     timer_.emplace(executor_);
     connection_ = std::make_unique<nats_connection>(server_options{.servers = options_.servers,
                                                                    .name = "cles " + host_.lock()->node().name,
@@ -170,6 +171,7 @@ void federated_pools::stop_if_finished() {
         }
         dials_.clear();
         on_link_ = nullptr;
+        work_.reset();
     }
 }
 

@@ -10,6 +10,7 @@
 #include "node/routing/other_pools.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/system/error_code.hpp>
 
@@ -103,6 +104,8 @@ class federated_pools final : public core::other_pools,
 
     const federation_options options_;
     boost::asio::any_io_executor executor_;
+    // What the thread posts does not count as work while it waits for NATS.
+    std::optional<boost::asio::executor_work_guard<boost::asio::any_io_executor>> work_;
     std::weak_ptr<core::local_node> host_;
     std::optional<bridging::bridge> bridge_;
     std::unique_ptr<nats_connection> connection_;

@@ -69,6 +69,14 @@ std::string last_error(natsStatus code) {
     return text.empty() ? std::string{natsStatus_GetText(code)} : text;
 }
 
+// The library does not pass on what a server says that accepts no more connections.
+std::string refusal(std::string said) {
+    if (said.find("Expected 'PONG', got ''") != std::string::npos) {
+        return "the server ended the connection at once: it may have its maximum of connections (" + said + ")";
+    }
+    return said;
+}
+
 std::string to_text(const char* text) { return text == nullptr ? std::string{} : std::string{text}; }
 
 event message_of(natsMsg* from) {
@@ -299,6 +307,8 @@ std::string nats_connection::configure(natsOptions* made) const {
     step(natsOptions_SetServers(made, servers.data(), static_cast<int>(servers.size())), "the URL of a server");
     step(natsOptions_SetName(made, options_.name.c_str()), "the name");
     step(natsOptions_SetTimeout(made, connect_timeout), "the time limit");
+    // Otherwise a thread of the library asks for it a millisecond later. `apply_commands` writes once for many.
+    step(natsOptions_SetSendAsap(made, true), "the buffer");
     step(natsOptions_SetAllowReconnect(made, false), "the connection"); // it would send again what was not sent
     step(natsOptions_SetPingInterval(made, ping_interval), "the interval");
     step(natsOptions_SetMaxPingsOut(made, max_pings_out), "the interval");
@@ -338,7 +348,7 @@ std::string nats_connection::connect() {
         closed_ = false;
         wants_write_ = false;
         if (const auto code = natsConnection_Connect(&connection_, made); code != NATS_OK) {
-            why = last_error(code);
+            why = refusal(last_error(code));
             connection_ = nullptr;
         }
     }

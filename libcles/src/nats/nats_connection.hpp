@@ -94,7 +94,7 @@ class nats_connection {
 
     void run();
     std::string connect();
-    std::string configure(__natsOptions* options) const;
+    std::string configure(__natsOptions* made) const;
     std::string serve();
     bool apply_commands();
     void apply(const command& c);
