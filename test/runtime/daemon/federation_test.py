@@ -239,6 +239,37 @@ class Federation(unittest.TestCase):
         self.folder.write("secret\n", "wrong")  # read at the next attempt
         wait_until(lambda: "seconds" in json.loads(hub.ask("PULL north.gate:utc")), "it works")
 
+    def test_a_server_that_is_full(self):
+        server = self.server("max_connections: 1")
+        hub = self.node("hub", "south", server)
+        hub.wait_for_entry("connected to NATS")
+        gate = self.node("gate", "north", server)
+        entry = gate.wait_for_entry("cannot connect to NATS")
+        self.assertRegex(entry["message"], "(?i)maximum (of )?connections")
+        self.assertIn("seconds", json.loads(gate.ask("PULL gate:utc")))
+        self.assertEqual(hub.stop()[0], 0)
+        gate.wait_for_entry("connected to NATS, as a bridge")
+
+    def test_a_server_that_hangs(self):
+        server, hub, gate = self.two_pools()
+        server.process.send_signal(signal.SIGSTOP)
+        wait_until(lambda: is_stopped(server.process.pid), "it is stopped")
+        try:
+            with hub.connect() as link:
+                begun = time.monotonic()
+                for number in range(1, 101):
+                    link.send(f"DELEGATE north.gate:once/{number}/0 id={number} deadline=10000")
+                self.assertEqual({body(link.read())["error"] for _ in range(100)}, {"unavailable"})
+                self.assertLess(time.monotonic() - begun, 4 + PATIENCE / 10)
+            self.assertIn("seconds", json.loads(hub.ask("PULL hub:utc")))
+            hub.wait_for_entry("the connection to NATS was lost")
+            gate.wait_for_entry("the connection to NATS was lost")
+        finally:
+            server.process.send_signal(signal.SIGCONT)
+        wait_until(lambda: "seconds" in json.loads(hub.ask("PULL north.gate:utc")), "it works again")
+        marks = self.folder.read("marks").splitlines()
+        self.assertEqual(len(set(marks)), len(marks))
+
     def test_no_server(self):
         server = self.server()
         server.stop()
@@ -396,6 +427,11 @@ class Federation(unittest.TestCase):
             code, _, errors = clesd("--config", file, "--check")
             self.assertEqual(code, 2, text)
             self.assertIn(why, errors)
+        file = self.folder.write(DEFAULTS.replace("tcp://", "tls://") + "security: {keys: /k}\n"
+                                 "federation: {nats: 'nats://h:4222', pool: north}\n")
+        code, _, errors = clesd("--config", file, "--check")
+        self.assertEqual(code, 2)
+        self.assertIn("federation: is refused with 'security': what crosses NATS is not sealed", errors)
         file = self.folder.write(DEFAULTS + "federation: {nats: ['nats://a:1', 'tls://b:2'], pool: north, token: /t, tls: {ca: /c}}\n")
         _, text, _ = clesd("--config", file, "--print-config")
         self.assertIn('federation: {nats: ["nats://a:1", "tls://b:2"], pool: "north", token: "/t", tls: {ca: "/c"}}', text)
