@@ -77,7 +77,7 @@ BOOST_AUTO_TEST_CASE(disabled_multicast_reads_back) {
 BOOST_AUTO_TEST_CASE(each_value_has_its_origin) {
     const auto text = to_yaml(all_set());
     BOOST_TEST(text.find("node: \"007\"  # clesd.yaml:1\n") != std::string::npos, text);
-    BOOST_TEST(text.find("drain: 2min  # clesd.yaml:14\n") != std::string::npos, text);
+    BOOST_TEST(text.find("drain: 2min  # clesd.yaml:15\n") != std::string::npos, text);
     BOOST_TEST(to_yaml(default_config("host", 4)).find("queue: 1024\n") != std::string::npos);
 }
 
