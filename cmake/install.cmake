@@ -13,6 +13,9 @@ set(cles_headers_left_out)
 if(NOT TARGET cles_security)
     set(cles_headers_left_out PATTERN "security" EXCLUDE PATTERN "security.hpp" EXCLUDE)
 endif()
+if(NOT TARGET cles_federation)
+    list(APPEND cles_headers_left_out PATTERN "federation.hpp" EXCLUDE)
+endif()
 install(DIRECTORY libcles/include/cles DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
     FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" ${cles_headers_left_out})
 install(TARGETS cles cles_plugin EXPORT cles-targets
@@ -27,6 +30,14 @@ if(TARGET cles_security)
         ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
         INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
     install(EXPORT cles-security-targets NAMESPACE cles:: DESTINATION "${cles_package_dir}")
+endif()
+
+if(TARGET cles_federation)
+    set_target_properties(cles_federation PROPERTIES EXPORT_NAME federation)
+    install(TARGETS cles_federation EXPORT cles-federation-targets
+        ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
+        INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+    install(EXPORT cles-federation-targets NAMESPACE cles:: DESTINATION "${cles_package_dir}")
 endif()
 
 # --- find_package(cles) ------------------------------------------------------------------------------------------------

@@ -8,65 +8,15 @@ leaves processes or files behind.
 FOLDER is where `clesd` and `cles` are.
 """
 
-import os
 import re
 import signal
-import subprocess
 import sys
-import tempfile
-import threading
 import unittest
-from pathlib import Path
 
-SCRIPT, PROGRAMS = sys.argv[1], sys.argv[2]
-BOUND = 100  # seconds; it takes about two
+from demo_case import DemoCase
 
 
-def members_of(session):
-    """The processes of a session, except those that have ended and have not been waited for."""
-    found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            text = stat.read_text()
-        except OSError:  # it has ended meanwhile
-            continue
-        state, _, _, its_session = text.rpartition(")")[2].split()[:4]
-        if int(its_session) == session and state != "Z":
-            found.append(text.partition(" (")[2].partition(")")[0])
-    return found
-
-
-class Demo(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
-
-    def show(self, programs=PROGRAMS, interrupt=None, at="", **more):
-        """Exit code, stdout and stderr; with a signal as soon as a line with those words has been read."""
-        files = self.folder / "files"
-        files.mkdir(exist_ok=True)
-        with tempfile.TemporaryFile("w+") as errors:
-            demo = subprocess.Popen([sys.executable, "-B", SCRIPT, programs], stdin=subprocess.DEVNULL,
-                                    stdout=subprocess.PIPE, stderr=errors, text=True, start_new_session=True,
-                                    env={**os.environ, "TMPDIR": str(files), **more})
-            watchdog = threading.Timer(BOUND, os.killpg, (demo.pid, signal.SIGKILL))
-            watchdog.start()
-            said = ""
-            for line in demo.stdout:
-                said += line
-                if interrupt and at in line:
-                    demo.send_signal(interrupt)
-                    interrupt = None
-            code = demo.wait()
-            watchdog.cancel()
-            demo.stdout.close()
-            errors.seek(0)
-            complaint = errors.read()
-        self.assertEqual(members_of(demo.pid), [], "processes that it left behind")
-        self.assertEqual(list(files.iterdir()), [], "files that it left behind")
-        return code, said, complaint
-
+class Demo(DemoCase):
     def test_it_shows_what_it_promises(self):
         # Without the variables for daemons and commands in the user's own environment.
         code, said, complaint = self.show(CLES_LISTEN="tcp://127.0.0.1:1", CLES_SEEDS="nonsense", CLES_AT="nonsense")

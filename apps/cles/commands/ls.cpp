@@ -6,6 +6,7 @@
 #include "commands.hpp"
 #include "discovery/ask_all.hpp"
 #include "discovery/find_nodes.hpp"
+#include "discovery/listed_pool.hpp"
 #include "options/arguments.hpp"
 #include "options/common_options.hpp"
 #include "output/errors.hpp"
@@ -42,6 +43,7 @@ struct ls_arguments {
     std::chrono::milliseconds wait = discovery_time;
     std::optional<std::chrono::milliseconds> timeout;
     bool tasks = false;
+    bool pools = false;
     std::string offered;
     output_format format = output_format::automatic;
 };
@@ -55,6 +57,31 @@ asio::awaitable<void> query_tasks(client& requester, std::vector<listed_node>& n
         if (nodes[i].error.empty()) {
             nodes[i].read_tasks(answers[i].json);
         }
+    }
+}
+
+// Asks each node for the pools that it reaches as a bridge.
+asio::awaitable<void> show_pools(client& requester, const std::vector<listed_node>& nodes,
+                                 std::chrono::milliseconds limit, output_format format) {
+    auto urls = urls_of(nodes);
+    const auto answers = co_await ask_all(requester, "self:cles/metrics", std::move(urls), limit);
+    std::vector<listed_pool> pools;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        if (!answers[i].error.empty()) {
+            note(printable(nodes[i].node) + ": " + printable(answers[i].error));
+            continue;
+        }
+        for (auto& each : pools_in(nodes[i].node, parse_json(answers[i].json))) {
+            pools.push_back(std::move(each));
+        }
+    }
+    if (resolved(format) == output_format::table) {
+        write_output(pools_table(pools));
+    } else {
+        printer{format, false}.print(pools_json(pools));
+    }
+    if (pools.empty()) {
+        note("none of these nodes is a bridge to other pools");
     }
 }
 
@@ -169,6 +196,10 @@ asio::awaitable<void> show(client& requester, const ls_arguments& args) {
     const auto until = std::chrono::steady_clock::now() + args.wait;
     auto nodes = co_await find_nodes(requester, args.addresses, until, args.timeout);
     const bool found_any = !nodes.empty();
+    if (args.pools) {
+        co_await show_pools(requester, nodes, args.timeout.value_or(2s), args.format);
+        co_return;
+    }
     if (args.tasks || !args.offered.empty()) {
         co_await query_tasks(requester, nodes, args.timeout.value_or(2s));
     }
@@ -202,6 +233,7 @@ void add_ls(CLI::App& app, context& shared) {
     command->add_flag("-l,--tasks", args->tasks, "Ask each node for its tasks");
     command->add_option("--offers", args->offered, "Only nodes that offer this task: TASK, or VERB:TASK")
         ->type_name("TASK");
+    command->add_flag("--pools", args->pools, "The other pools that these nodes reach as bridges");
     add_duration(*command, "-w,--wait", args->wait, "How long to listen (default 350ms)");
     args->addresses.add_options(*command);
     add_timeout(*command, args->timeout, "2s");
@@ -217,6 +249,9 @@ void add_ls(CLI::App& app, context& shared) {
                     "  cles ls --at tcp://10.0.0.7");
     command->callback([args, &shared] {
         check_offered(args->offered);
+        if (args->pools && (args->tasks || !args->offered.empty())) {
+            throw usage_error("--pools lists pools, which have no --tasks or --offers");
+        }
         args->addresses.check_discovery();
         client requester{args->addresses, shared.verbosity};
         shared.exit_code = requester.run(show(requester, *args));

@@ -6,9 +6,11 @@
 #include "commands/top_rows.hpp"
 #include "discovery/ask_all.hpp"
 #include "discovery/find_nodes.hpp"
+#include "discovery/listed_pool.hpp"
 #include "options/common_options.hpp"
 #include "options/duration.hpp"
 #include "output/errors.hpp"
+#include "output/json_node.hpp"
 #include "output/printer.hpp"
 #include "output/screen.hpp"
 #include "output/terminal.hpp"
@@ -23,6 +25,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -44,6 +47,7 @@ struct top_arguments {
     std::chrono::milliseconds interval{1000};
     std::uint64_t count = 0;
     top_order order = top_order::load;
+    bool pools = false;
     output_format format = output_format::automatic;
 };
 
@@ -85,12 +89,16 @@ class live_view {
         urls.resize(std::min(urls.size(), max_queried));
         const auto answers = co_await ask_all(requester_, "self:cles/metrics", std::move(urls), limit);
         rows_.clear();
+        bridges_.clear();
         for (std::size_t i = 0; i < nodes.size(); ++i) {
             top_row row{.node = std::move(nodes[i])};
             if (i < answers.size()) {
                 read_metrics(answers[i], row);
             }
             rows_.push_back(std::move(row));
+        }
+        if (args_.pools) {
+            co_await add_pools(limit);
         }
         rates_.remove_before(steady::now() - std::max<std::chrono::milliseconds>(args_.interval * 10, 1min));
         sort_rows(rows_, args_.order);
@@ -102,9 +110,53 @@ class live_view {
             return;
         }
         try {
-            row.rate = rates_.update(row.node.node + " " + row.node.epoch, answer.json, steady::now());
+            const auto metrics = parse_json(answer.json);
+            row.rate = rates_.update(row.node.node + " " + row.node.epoch, metrics, steady::now());
+            for (auto& pool : pools_in(row.node.node, metrics)) {
+                if (pool.state == "live" && !row.node.url().empty()) {
+                    bridges_.try_emplace(std::move(pool.pool), row.node.url());
+                }
+            }
         } catch (const cles::error& e) {
             row.node.error = e.message();
+        }
+    }
+
+    // The nodes of the other pools, each pool asked through the first bridge that reaches it.
+    asio::awaitable<void> add_pools(std::chrono::milliseconds limit) {
+        for (const auto& [pool, url] : bridges_) {
+            std::vector<std::string> bridge{url};
+            const auto answers = co_await ask_all(requester_, pool + ".all:cles/metrics", std::move(bridge), limit);
+            add_pool(pool, answers.front());
+        }
+    }
+
+    void add_pool(const std::string& pool, const node_answer& answer) {
+        const auto add = [&](const std::string& node, std::string why) -> top_row& {
+            rows_.push_back({.node = {.node = pool + "." + node, .state = why.empty() ? "live" : "unknown"}});
+            rows_.back().node.error = std::move(why);
+            return rows_.back();
+        };
+        if (!answer.error.empty()) {
+            add("all", answer.error);
+            return;
+        }
+        try {
+            const auto outcome = parse_json(answer.json);
+            if (const auto* const results = outcome.find("results")) {
+                for (const auto& [node, metrics] : results->members) {
+                    auto& row = add(node, {});
+                    row.rate = rates_.update(row.node.node, metrics, steady::now());
+                }
+            }
+            if (const auto* const errors = outcome.find("errors")) {
+                for (const auto& [node, failure] : errors->members) {
+                    const auto* const code = failure.find("error");
+                    add(node, code == nullptr ? "failed" : code->text);
+                }
+            }
+        } catch (const cles::error& e) {
+            add("all", e.message());
         }
     }
 
@@ -131,6 +183,7 @@ class live_view {
     std::optional<screen> screen_;
     node_rates rates_;
     std::vector<top_row> rows_;
+    std::map<std::string, std::string> bridges_; // the URL of one that reaches the pool, by pool
     std::string error_;
     bool is_first_ = true;
 };
@@ -165,6 +218,7 @@ void add_top(CLI::App& app, context& shared) {
             "The order: load or name (default load)")
         ->type_name("WORD")
         ->check(CLI::IsMember({"load", "name"}).description(""));
+    command->add_flag("--pools", args->pools, "Also the nodes of other pools that these nodes reach as bridges");
     args->addresses.add_options(*command);
     add_output_option(*command, args->format);
     command->footer("The nodes are asked for their metrics; rates are shown from the second refresh on.\n"
@@ -172,6 +226,7 @@ void add_top(CLI::App& app, context& shared) {
                     "Examples:\n"
                     "  cles top\n"
                     "  cles top --at tcp://10.0.0.7 --sort name\n"
+                    "  cles top --pools\n"
                     "  cles top -n 2 -o json | jq -c '.nodes[] | [.node, .requests_per_s]'");
     command->callback([args, &shared] {
         args->addresses.check_discovery();

@@ -3,7 +3,6 @@
 
 #include <cles/json_writer.hpp>
 
-#include "output/json_node.hpp"
 #include "output/statistics.hpp"
 #include "output/table.hpp"
 #include "output/terminal.hpp"
@@ -71,8 +70,7 @@ void write_rate(cles::json_writer& w, std::string_view name, const std::optional
 
 } // namespace
 
-node_rate node_rates::update(const std::string& run, std::string_view metrics, time_point now) {
-    const auto document = parse_json(metrics);
+node_rate node_rates::update(const std::string& run, const json_node& document, time_point now) {
     counters current{.when = now};
     if (const auto* requests = document.find("requests"); requests != nullptr) {
         for (const auto& [verb, count] : requests->members) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "discovery/listed_node.hpp"
+#include "output/json_node.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -29,8 +30,7 @@ class node_rates {
     using time_point = std::chrono::steady_clock::time_point;
 
     /// \param run identifies a run of a node, because each run counts from 0
-    /// \throws cles::error if it is not JSON
-    node_rate update(const std::string& run, std::string_view metrics, time_point now);
+    node_rate update(const std::string& run, const json_node& metrics, time_point now);
 
     /// Removes nodes that have not answered since.
     void remove_before(time_point when);
@@ -44,7 +44,7 @@ class node_rates {
     std::map<std::string, counters> last_;
 };
 
-/// A node as `cles top` shows it.
+/// A node as `cles top` shows it; of another pool, with the pool's name before its own: "north.car1".
 struct top_row {
     listed_node node; ///< `error`: why its metrics are not known
     node_rate rate{};

@@ -15,6 +15,7 @@ namespace tool {
 
 class address_book;
 class client;
+struct listed_node;
 
 enum class verdict : std::uint8_t { ok, warning, failure };
 
@@ -62,6 +63,11 @@ boost::asio::awaitable<void> check_ports(client& requester, const address_book& 
 
 /// Whether the nodes that announce themselves answer, have unique names, the same roster, and the time of this host.
 boost::asio::awaitable<void> check_nodes(client& requester, const address_book& addresses, findings& found);
+
+/// Of the nodes that are bridges to other pools: whether they are connected to NATS, how long a message takes there and
+/// back, and whether the pools can be reached.
+boost::asio::awaitable<void> check_federation(client& requester, const std::vector<listed_node>& nodes,
+                                              findings& found);
 
 /// The clock of this host.
 void check_clock(findings& found);

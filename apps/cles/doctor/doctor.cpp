@@ -136,8 +136,9 @@ void add_doctor(CLI::App& app, context& shared) {
     args->addresses.add_options(*command);
     add_output_option(*command, args->format);
     command->footer("Checks the configuration of clesd, the key directory, interfaces, multicast, ports, nodes, the "
-                    "clock and limits, and\n"
-                    "reports what is wrong and how to correct it. The exit code is 1 if a check fails.\n\n"
+                    "connections of bridges\n"
+                    "to NATS, the clock and limits, and reports what is wrong and how to correct it. The exit code is "
+                    "1 if a check fails.\n\n"
                     "Examples:\n"
                     "  cles doctor\n"
                     "  cles doctor -m eth0\n"

@@ -216,6 +216,7 @@ asio::awaitable<void> check_nodes(client& requester, const address_book& address
     }
     co_await check_names(requester, nodes, found);
     co_await check_plugins(requester, nodes, found);
+    co_await check_federation(requester, nodes, found);
     co_await compare_clocks(requester, nodes, found);
 }
 

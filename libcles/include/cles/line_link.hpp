@@ -39,6 +39,8 @@ class link_events {
     /// Over datagrams: the peer has restarted, and has another epoch. It may have received what was sent before, or
     /// not.
     virtual void on_restart() {}
+    /// The bindings made on the link have ended; requests go on.
+    virtual void on_bindings_lost(const std::string& /*why*/) {}
     /// Over datagrams: the peer does not prove its name. \param lost what is sent to it is lost meanwhile
     virtual void on_unanswered(bool /*lost*/) {}
     /// The former name of `on_writable`, for callers.

@@ -52,8 +52,19 @@ class io_context;
 
 namespace cles {
 
+namespace asio_port {
+class asio_environment;
+} // namespace asio_port
+
+namespace core {
+struct node_options;
+} // namespace core
+
 namespace detail {
 class security_part;
+/// Adds to a service's environment and to the settings of its node. As a function, it adds less to programs without one
+/// than an object would.
+using service_part = std::function<void(asio_port::asio_environment&, core::node_options&)>;
 struct tracing_part;
 } // namespace detail
 
@@ -77,6 +88,9 @@ struct service_options {
     /// The name of the pool that it belongs to; empty: the unnamed pool. Nodes of other pools are ignored, so two pools
     /// that share a network or reuse a port stay separate.
     std::string pool{};
+    /// `cles::federation({...})` joins the pool to others through NATS (<cles/federation.hpp>, docs/federation.md).
+    /// Each service needs its own.
+    detail::service_part federation{};
     /// Called on the service's executor when another live node had this node's name first (of two that started within a
     /// second, the one with the lower epoch has it), with that node's URL. The service continues, but receives no
     /// requests by its name.

@@ -14,7 +14,7 @@ inline constexpr std::uint16_t default_port = 25370;
 ///
 /// ```
 /// url      = ( "tcp://" / "tls://" / "udp://" ) host [ ":" port ] [ "?dscp=" number ]
-///          / "unix://" path / "inproc://" name
+///          / "unix://" path / "inproc://" name / "pool://" name
 /// host     = IPv4 address / "[" IPv6 address [ "%25" zone ] "]" / host name
 /// path     = "/" ... (a socket file) / "@" ... (an abstract socket)
 /// ```
@@ -23,7 +23,7 @@ inline constexpr std::uint16_t default_port = 25370;
 /// every packet that this end sends on the link, so that the network can prioritise links.
 struct url {
     std::string scheme;
-    std::string host; ///< of `tcp`, `tls` and `udp`, without brackets; of `inproc`, the name
+    std::string host; ///< of `tcp`, `tls` and `udp`, without brackets; of `inproc` and `pool`, the name
     std::uint16_t port = 0;
     std::string path;                   ///< of `unix`
     std::optional<std::uint8_t> dscp{}; ///< of `tcp`, `tls` and `udp`: 0 to 63

@@ -46,6 +46,9 @@ core::local_node_options options_of(service_options&& all, asio_port::asio_envir
     if (all.security) {
         all.security->equip(by, result.node);
     }
+    if (all.federation) {
+        all.federation(by, result.node);
+    }
     return result;
 }
 

@@ -7,6 +7,7 @@
 
 #include "node/base/completion_drain.hpp"
 #include "node/membership/reachable_endpoints.hpp"
+#include "node/routing/other_pools.hpp"
 #include "node/session/request_checks.hpp"
 #include "protocol/grammar.hpp"
 
@@ -162,6 +163,9 @@ void local_node::start(const std::vector<std::string>& listen_at) {
     }
     for (const auto& where : listen_at) {
         listen(where);
+    }
+    if (node_->pools) {
+        node_->pools->start(*this);
     }
     if (multicast_.is_on()) {
         join_group();

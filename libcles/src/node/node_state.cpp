@@ -12,8 +12,8 @@ namespace cles::core {
 node_state::node_state(node_options setup, const core::clock& source, const std::function<void()>& wake)
     : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
       bounds(setup.bounds), authorise(std::move(setup.authorise)), security(std::move(setup.security)),
-      log(std::move(setup.log)), metrics(std::move(setup.metrics)), load(std::move(setup.load)), time(source),
-      started(source.now()), completions(std::move(setup.complete)), memory(bounds.memory),
+      pools(setup.pools), log(std::move(setup.log)), metrics(std::move(setup.metrics)), load(std::move(setup.load)),
+      time(source), started(source.now()), completions(std::move(setup.complete)), memory(bounds.memory),
       kept_values(std::make_shared<memory_account>(memory, memory_account::share::half)),
       kept_requests(std::make_shared<memory_account>(memory)), peers(name, setup.epoch, deadlines, bounds.peers),
       unsent(wake),

@@ -31,6 +31,7 @@ namespace cles::core {
 
 class gossip;
 class node_security;
+class other_pools;
 class request_sharing;
 class security_protocol;
 class span_recorder;
@@ -48,6 +49,7 @@ struct node_options {
     std::shared_ptr<node_security> security{}; ///< null: the node is not secured
     /// Creates what a secured node says; null only without `security`.
     std::unique_ptr<security_protocol> (*secured)(node_state& host) = nullptr;
+    other_pools* pools = nullptr;                  ///< owned by `metrics`; null: the node reaches its own pool only
     const detail::tracing_part* tracing = nullptr; ///< null: nothing is recorded of traced requests
     log_sink log{};
     std::function<void(json_writer&)> metrics{}; ///< metrics of the program
@@ -71,6 +73,7 @@ struct node_state {
     const cles::limits bounds;
     const authoriser authorise;
     const std::shared_ptr<node_security> security;
+    other_pools* const pools;
     const log_sink log;
     const std::function<void(json_writer&)> metrics;
     const std::function<node_load()> load;

@@ -93,7 +93,7 @@ url parse_url(std::string_view text) {
             refuse(text, "a Unix socket's path has at most 107 bytes");
         }
         out.path = rest;
-    } else if (out.scheme == "inproc") {
+    } else if (out.scheme == "inproc" || out.scheme == "pool") {
         if (rest.empty()) {
             refuse(text, "the name is missing");
         }
@@ -109,7 +109,7 @@ std::string to_string(const url& u) {
     if (u.scheme == "unix") {
         return text + u.path;
     }
-    if (u.scheme == "inproc") {
+    if (u.scheme == "inproc" || u.scheme == "pool") {
         return text + u.host;
     }
     if (u.host.find(':') != std::string::npos) {

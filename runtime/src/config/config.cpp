@@ -117,6 +117,14 @@ void check(const config& setup) {
                            "'" + setup.multicast.interface +
                                "' can be reached from other hosts, which requires 'insecure: true'");
     }
+    if (setup.federation.is_on() && setup.security.is_on()) {
+        throw config_error(setup.location_of("federation"),
+                           "is refused with 'security': what crosses NATS is not sealed");
+    }
+    if (setup.federation.is_on() && !setup.pool.empty() && setup.pool != setup.federation.pool) {
+        throw config_error(setup.location_of("federation.pool"),
+                           "'" + setup.federation.pool + "' is another pool than 'pool: " + setup.pool + "'");
+    }
     if (setup.peers.contains(setup.node)) {
         throw config_error(setup.location_of("peers." + setup.node), "is this node's own name");
     }

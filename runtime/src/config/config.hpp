@@ -49,6 +49,20 @@ struct security_config {
     bool operator==(const security_config&) const = default;
 };
 
+/// How the node joins its pool to others; see <cles/federation.hpp>.
+struct federation_config {
+    std::vector<std::string> servers; ///< URLs of NATS; none: it does not
+    std::string pool;
+    std::string credentials; ///< these are files; empty: none
+    std::string token;
+    std::string tls_authority;
+    std::string tls_certificate;
+    std::string tls_key;
+
+    [[nodiscard]] bool is_on() const noexcept { return !servers.empty(); }
+    bool operator==(const federation_config&) const = default;
+};
+
 /// The configuration of a daemon, combined from all its sources (docs/runtime.md).
 struct config {
     std::string node;
@@ -62,6 +76,7 @@ struct config {
     std::vector<std::string> seeds;
     std::vector<std::string> links; ///< the only nodes that this one may have links to; empty: all
     std::map<std::string, std::string> peers;
+    federation_config federation;
 
     std::uint32_t workers = 1;
     std::uint32_t queue = 1024;

@@ -122,6 +122,39 @@ security_config security_of(const yaml_value& from) {
     return read;
 }
 
+federation_config federation_of(const yaml_value& from) {
+    federation_config read;
+    if (from.is_scalar()) {
+        from.as([](const std::string& text) {
+            if (text != "off") {
+                throw invalid_value("'" + text + "' is not 'off', and has no keys 'nats' and 'pool'");
+            }
+            return text;
+        });
+        return read;
+    }
+    const auto read_tls = [&read](const yaml_value& tls) {
+        tls.read_map({{"ca", part(read.tls_authority, scalar(to_absolute_path))},
+                      {"certificate", part(read.tls_certificate, scalar(to_absolute_path))},
+                      {"key", part(read.tls_key, scalar(to_absolute_path))}});
+        if (read.tls_certificate.empty() != read.tls_key.empty()) {
+            tls.fail("has only one of 'certificate' and 'key'");
+        }
+    };
+    from.read_map({{"nats", part(read.servers, list(to_nats_url))},
+                   {"pool", part(read.pool, scalar(to_federated_pool_name))},
+                   {"credentials", part(read.credentials, scalar(to_absolute_path))},
+                   {"token", part(read.token, scalar(to_absolute_path))},
+                   {"tls", read_tls}});
+    if (!read.is_on()) {
+        from.fail("has no 'nats', the URL of a server");
+    }
+    if (read.pool.empty()) {
+        from.fail("has no 'pool', the name of the node's pool");
+    }
+    return read;
+}
+
 isolation_limits isolation_limits_of(const yaml_value& from) {
     constexpr std::uint64_t least = std::uint64_t{64} << 20U;
     constexpr std::uint64_t most = std::uint64_t{1} << 40U;
@@ -250,6 +283,20 @@ std::string text_of(const security_config& security) {
                : "{keys: " + text_of(security.keys) + ", local_users: " + text_of(security.local_users) + "}";
 }
 
+std::string text_of(const federation_config& federation) {
+    if (!federation.is_on()) {
+        return "off";
+    }
+    const auto file = [](const char* key, const std::string& path) {
+        return path.empty() ? std::string{} : ", " + std::string{key} + ": " + text_of(path);
+    };
+    const auto tls = file("ca", federation.tls_authority) + file("certificate", federation.tls_certificate) +
+                     file("key", federation.tls_key);
+    return "{nats: " + text_of(federation.servers) + ", pool: " + text_of(federation.pool) +
+           file("credentials", federation.credentials) + file("token", federation.token) +
+           (tls.empty() ? "}" : ", tls: {" + tls.substr(2) + "}}");
+}
+
 std::string text_of(const log_config& log) {
     return "{level: " + std::string{to_string(log.level)} + ", format: " + std::string{to_string(log.format)} + "}";
 }
@@ -322,6 +369,7 @@ const std::vector<setting>& settings() {
                                           value("seeds", &config::seeds, list(to_url)),
                                           value("links", &config::links, list(to_node_name)),
                                           value("peers", &config::peers, peers_of),
+                                          value("federation", &config::federation, federation_of),
                                           value("workers", &config::workers, count(1, max_workers)),
                                           value("queue", &config::queue, count(1, max_queue)),
                                           value("stuck_after", &config::stuck_after, scalar(to_duration)),

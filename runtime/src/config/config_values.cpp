@@ -147,6 +147,25 @@ std::string to_pool_name(std::string_view text) {
     return std::string{text};
 }
 
+std::string to_federated_pool_name(std::string_view text) {
+    constexpr std::size_t longest = 32;
+    if (!is_name(text) || text.size() > longest || text.find('.') != std::string_view::npos || text == "self" ||
+        text == "any" || text == "all") {
+        refuse(text, "is not a valid name of a pool that others reach (1 to 32 letters, digits, '_', '-')");
+    }
+    return std::string{text};
+}
+
+std::string to_nats_url(std::string_view text) {
+    const auto host = text.substr(std::min(text.find("://"), text.size()));
+    constexpr std::size_t shortest = 4;
+    if ((!text.starts_with("nats://") && !text.starts_with("tls://")) || host.size() < shortest ||
+        text.find_first_of(" \t,") != std::string_view::npos) {
+        refuse(text, "is not the URL of a NATS server, as in nats://host:4222");
+    }
+    return std::string{text};
+}
+
 std::string to_node_name(std::string_view text) {
     if (!is_name(text)) {
         refuse(text, "is not a valid node name (1 to 64 letters, digits, '_', '-', '.')");

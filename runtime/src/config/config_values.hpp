@@ -37,6 +37,10 @@ std::string wake_within_text(std::optional<std::chrono::microseconds> bound);
 std::string to_node_name(std::string_view text);
 /// Empty: the unnamed pool.
 std::string to_pool_name(std::string_view text);
+/// The name of a pool that others reach: one word.
+std::string to_federated_pool_name(std::string_view text);
+/// "nats://host:4222", "tls://host:4222"
+std::string to_nats_url(std::string_view text);
 /// A URL for listening or connecting: of a registered scheme, and not only within a process.
 std::string to_url(std::string_view text);
 /// "10.0.0.0/8", "fd00::/8"

@@ -6,6 +6,7 @@
 #include "config/config.hpp"
 #include "config/config_file.hpp"
 #include "config/config_values.hpp"
+#include "daemon/daemon_federation.hpp"
 #include "daemon/daemon_security.hpp"
 #include "jobs/current_trace.hpp"
 #include "jobs/pooled_registrar.hpp"
@@ -38,6 +39,7 @@ service_options options_of(const config& setup, const daemon_log& log) {
     options.peers = setup.peers;
     options.insecure = setup.insecure;
     options.security = security_of(setup);
+    options.federation = federation_of(setup);
     options.networks = setup.networks;
     options.multicast = setup.multicast;
     options.limits = setup.limits;

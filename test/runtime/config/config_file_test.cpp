@@ -107,6 +107,12 @@ const mistake mistakes[] = {
     {"security: {local_users: {root: car1}}\n", "clesd.yaml:1: security: ", "has no 'keys'"},
     {"security:\n  keys: /k\n  users: {}\n", "clesd.yaml:3: security.users: ", "unknown key"},
     {"security:\n  keys: /k\n  local_users:\n    root: any\n", "clesd.yaml:4: security.local_users.root: ", "any"},
+    {"federation: {pool: north}\n", "clesd.yaml:1: federation: ", "has no 'nats'"},
+    {"federation: {nats: 'nats://h'}\n", "clesd.yaml:1: federation: ", "has no 'pool'"},
+    {"federation:\n  nats: h\n", "clesd.yaml:2: federation.nats: ", "is not the URL of a NATS server"},
+    {"federation: {nats: 'nats://h', pool: any}\n", "clesd.yaml:1: federation.pool: ", "is not a valid name"},
+    {"federation: {nats: 'nats://h', pool: n, tls: {key: /k}}\n", "clesd.yaml:1: federation.tls: ", "has only one of"},
+    {"federation: on\n", "clesd.yaml:1: federation: ", "is not 'off'"},
     // other invalid files
     {"node: a\nworkers: 1\nnode: b\n", "clesd.yaml:3: node: ", "is a duplicate of the key in line 1"},
     {"- node\n", "clesd.yaml:1: ", "has to be a map"},

@@ -15,7 +15,9 @@ config all_set() {
     read_config("node: \"007\"\npool: north\nallow_clash: on\nlisten: [tcp://127.0.0.1:1, unix://@a b]\ninsecure: "
                 "on\nnetworks: [fd00::/8]\n"
                 "multicast: {port: 4000, required: false}\nseeds: [tcp://127.0.0.1:2]\n"
-                "peers: {a: tcp://127.0.0.1:3, b.c: udp://127.0.0.1:3}\nworkers: 3\nqueue: 9\nstuck_after: 1500ms\n"
+                "peers: {a: tcp://127.0.0.1:3, b.c: udp://127.0.0.1:3}\n"
+                "federation: {nats: [nats://a, tls://b:1], pool: north, token: /t, tls: {ca: /c, certificate: /d, key: "
+                "/e}}\nworkers: 3\nqueue: 9\nstuck_after: 1500ms\n"
                 "replacements: 0\ndrain: 2min\nplugin_path: [/a, 'b: c']\n"
                 "plugins: [{path: x.so, config: {a: [1, '2', null], b: \"q\\\"\"}, required: false}, y.so,\n"
                 "  {path: z.so, sha256: 0000000000000000000000000000000000000000000000000000000000000007}]\n"
@@ -50,6 +52,7 @@ BOOST_AUTO_TEST_CASE(printed_configuration_reads_back) {
         BOOST_TEST((after.multicast == before.multicast));
         BOOST_TEST((after.plugins == before.plugins));
         BOOST_TEST((after.peers == before.peers));
+        BOOST_TEST((after.federation == before.federation));
         BOOST_TEST((after.limits.lease == before.limits.lease));
         BOOST_TEST((after.wake_within == before.wake_within));
     }
@@ -74,7 +77,7 @@ BOOST_AUTO_TEST_CASE(disabled_multicast_reads_back) {
 BOOST_AUTO_TEST_CASE(each_value_has_its_origin) {
     const auto text = to_yaml(all_set());
     BOOST_TEST(text.find("node: \"007\"  # clesd.yaml:1\n") != std::string::npos, text);
-    BOOST_TEST(text.find("drain: 2min  # clesd.yaml:14\n") != std::string::npos, text);
+    BOOST_TEST(text.find("drain: 2min  # clesd.yaml:15\n") != std::string::npos, text);
     BOOST_TEST(to_yaml(default_config("host", 4)).find("queue: 1024\n") != std::string::npos);
 }
 

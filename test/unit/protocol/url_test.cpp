@@ -34,6 +34,7 @@ BOOST_AUTO_TEST_CASE(a_url_is_parsed_and_written_again) {
         {"unix://@car1", "unix", "", 0, "@car1", "unix://@car1"},
         {"unix:///a b/c:d", "unix", "", 0, "/a b/c:d", "unix:///a b/c:d"},
         {"inproc://car1", "inproc", "car1", 0, "", "inproc://car1"},
+        {"pool://north", "pool", "north", 0, "", "pool://north"},
         {"tcp://10.0.0.2:7?dscp=46", "tcp", "10.0.0.2", 7, "", "tcp://10.0.0.2:7?dscp=46"},
         {"tls://10.0.0.2", "tls", "10.0.0.2", 25370, "", "tls://10.0.0.2:25370"},
         {"udp://[::1]?dscp=0", "udp", "::1", 25370, "", "udp://[::1]:25370?dscp=0"},

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/routing/deferred_request.hpp"
 
+#include <cles/json_reader.hpp>
+
 #include "node/routing/load_balancer.hpp"
+#include "node/routing/other_pools.hpp"
 #include "node/session/request_checks.hpp"
 
 #include <algorithm>
@@ -20,6 +23,15 @@ std::chrono::milliseconds pause_after(const subrequest_failure& why) {
     }
     return std::chrono::milliseconds{
         std::min<std::uint64_t>(why.reported.retry_ms.value_or(protocol::default_retry_ms), 1'000)};
+}
+
+// The other pools that serve this request too. One that comes from another pool, or from a program that uses NATS, is
+// for this one; and what nodes say of themselves is asked of each pool by itself.
+std::vector<other_pools::known_pool> other_pools_for(const node_state& host, const protocol::request_line& r,
+                                                     const identity& peer) {
+    return host.pools && peer.transport != "pool" && r.hops != 0 && r.noun.task != "cles"
+               ? host.pools->list()
+               : std::vector<other_pools::known_pool>{};
 }
 
 void begin_member(std::string& in, std::string_view node) {
@@ -47,16 +59,19 @@ bool any_request::begin(time_point now) {
     if (!retry_after_ && routing_->waits_for_discovery()) {
         return false;
     }
-    const auto chosen = routing_->choose(*request_, requester_, asked_, now);
+    const auto chosen =
+        busy_ < max_busy ? routing_->choose(*request_, requester_, asked_, now) : load_balancer::chosen{};
     if (over()) { // the program's load function has stopped the service
         return true;
     }
     if (!chosen.nobody()) {
         ask(chosen, now);
+    } else if (!retry_after_ && routing_->expects_more()) {
+        return false;
+    } else if (auto pool = next_pool(); !pool.empty()) {
+        ask_elsewhere(std::move(pool));
     } else if (retry_after_) {
         give_up(retry_after_->reported, retry_after_->may_have_started);
-    } else if (routing_->expects_more()) {
-        return false;
     } else {
         call_->fail(routing_->no_provider(*request_));
     }
@@ -69,9 +84,7 @@ void any_request::ask(const load_balancer::chosen& chosen, time_point now) {
         follow_call();
     }
     part_ = {};
-    const auto then = [this, self = shared_from_this()](std::string_view json, subrequest_failure* why) {
-        on_outcome(json, why);
-    };
+    const auto then = outcome();
     if (chosen.other != nullptr) {
         asked_.push_back(chosen.other->name);
         ++chosen.other->given;
@@ -81,6 +94,31 @@ void any_request::ask(const load_balancer::chosen& chosen, time_point now) {
     asked_.push_back(routing_->host().name);
     part_.here = std::make_unique<local_request>(call_->host(), then, call_->memory(), progress_to(call_));
     part_.here->run(*request_, peer_, reply_due_, now);
+}
+
+subrequest_outcome any_request::outcome() {
+    return [this, self = shared_from_this()](std::string_view json, subrequest_failure* why) { on_outcome(json, why); };
+}
+
+// "north.any" of a pool that was not asked; empty if all were.
+std::string any_request::next_pool() const {
+    for (const auto& pool : other_pools_for(routing_->host(), *request_, peer_)) {
+        auto target = pool.name + ".any";
+        if (pool.live && std::find(asked_.begin(), asked_.end(), target) == asked_.end()) {
+            return target;
+        }
+    }
+    return {};
+}
+
+void any_request::ask_elsewhere(std::string node) {
+    idempotent_ = request_->verb == verb::pull; // of a task there, that is not known
+    if (asked_.empty()) {
+        follow_call();
+    }
+    part_ = {};
+    asked_.push_back(std::move(node));
+    part_.ticket = routing_->send(*request_, requester_, asked_.back(), reply_due_, outcome(), progress_to(call_));
 }
 
 void any_request::continue_after_local_refusal(const protocol::failure& why) {
@@ -132,7 +170,7 @@ void any_request::try_next(subrequest_failure why) {
     const bool may_have_started = why.may_have_started;
     const bool lost = may_have_started && why.reported.code == errc::unavailable;
     busy_ += busy ? 1 : 0;
-    const bool repeat = may_repeat(why) && busy_ < max_busy;
+    const bool repeat = may_repeat(why) && (busy_ < max_busy || !next_pool().empty());
     auto reported = named(std::move(why), asked_.back());
     if (lost && lost_) {
         reported.ran = true;
@@ -202,12 +240,25 @@ void scatter_gather::ask_known(time_point now) {
             }
         }
     }
+    add_pools();
     if (parts_.empty()) {
         call_->fail(routing_->no_provider(r));
         return;
     }
     std::sort(parts_.begin(), parts_.end(), [](const part& a, const part& b) { return a.node < b.node; });
     ask_all(now);
+}
+
+void scatter_gather::add_pools() {
+    for (auto& pool : other_pools_for(routing_->host(), *request_, peer_)) {
+        auto& added = parts_.emplace_back();
+        added.node = pool.name + ".all";
+        added.pool = std::move(pool.name);
+        if (!pool.live) {
+            added.failure = protocol::failure{.code = errc::unavailable,
+                                              .message = added.pool + " has no bridge that can be reached"};
+        }
+    }
 }
 
 void scatter_gather::ask_all(time_point now) {
@@ -221,13 +272,16 @@ void scatter_gather::ask_all(time_point now) {
     for (auto at = parts_.begin(); at != parts_.end() && !ended_; ++at) {
         if (at->node == routing_->host().name) {
             own = &*at;
-        } else {
+        } else if (at->is_open()) {
             at->ticket = routing_->send(*request_, requester_, at->node, by, then(*at));
         }
     }
     if (own != nullptr && !ended_) { // last, since its handler may do anything
         own->here = std::make_unique<local_request>(call_->host(), then(*own), call_->memory());
         own->here->run(*request_, peer_, by, now);
+    }
+    if (!ended_) {
+        follow(); // if nothing had to be asked
     }
 }
 
@@ -275,10 +329,18 @@ void scatter_gather::follow() {
 void scatter_gather::finish() {
     aggregate_reply text;
     for (const auto& p : parts_) {
-        text.add(p.node, p);
+        if (p.pool.empty()) {
+            text.add(p.node, p);
+        } else {
+            text.add_pool(p.pool, p);
+        }
     }
     withdraw(); // those that are late
-    call_->done(text.whole());
+    if (text.is_empty()) {
+        call_->fail(routing_->no_provider(*request_));
+    } else {
+        call_->done(text.whole());
+    }
 }
 
 void scatter_gather::withdraw() {
@@ -308,6 +370,35 @@ void aggregate_reply::add(std::string_view node, const node_outcome& found) {
         begin_member(marks_, node);
         marks_.append(R"({"seq":)").append(std::to_string(found.mark->seq));
         marks_.append(R"(,"epoch":")").append(protocol::epoch_text(found.mark->epoch)).append("\"}");
+    }
+}
+
+void aggregate_reply::add_pool(std::string_view pool, const node_outcome& found) {
+    if (!found.result) {
+        if (!found.failure || found.failure->code != errc::no_target || found.failure->ran) {
+            add(std::string{pool}.append(".all"), found);
+        }
+        return;
+    }
+    json_reader reader{*found.result, detail::answer_depth};
+    std::string_view part;
+    reader.begin_object();
+    while (reader.next_key(part)) {
+        auto* const into = part == "results" ? &results_ : part == "errors" ? &errors_ : nullptr;
+        if (into == nullptr || reader.peek() != json_reader::kind::object) {
+            reader.skip();
+            continue;
+        }
+        reader.begin_object();
+        std::string_view node;
+        while (reader.next_key(node)) {
+            const auto name = std::string{pool}.append(".").append(node);
+            std::string_view value;
+            if (reader.read_raw(value)) {
+                begin_member(*into, name);
+                into->append(value);
+            }
+        }
     }
 }
 

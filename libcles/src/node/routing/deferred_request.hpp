@@ -79,6 +79,9 @@ class any_request final : public deferred_request {
 
   private:
     void withdraw() override { routing_->cancel(part_); }
+    void ask_elsewhere(std::string node);
+    [[nodiscard]] subrequest_outcome outcome();
+    [[nodiscard]] std::string next_pool() const;
     void on_outcome(std::string_view json, subrequest_failure* why);
     void try_next(subrequest_failure why);
     void give_up(protocol::failure why, bool may_have_started);
@@ -113,6 +116,11 @@ class aggregate_reply {
     explicit aggregate_reply(bool with_marks = false) : with_marks_(with_marks) {}
 
     void add(std::string_view node, const node_outcome& found);
+    /// What all nodes of another pool have replied. A failure means that nothing is known of its nodes; without a
+    /// provider of the task there, nothing is added.
+    void add_pool(std::string_view pool, const node_outcome& found);
+    /// Nothing was added.
+    [[nodiscard]] bool is_empty() const noexcept { return results_.empty() && errors_.empty(); }
     [[nodiscard]] std::string whole() const;
 
   private:
@@ -140,12 +148,14 @@ class scatter_gather final : public deferred_request, private deadline {
 
   private:
     struct part : attempt, node_outcome {
-        std::string node;
+        std::string node; ///< for another pool, "north.all"
+        std::string pool{};
     };
 
     void on_outcome(part& at, std::string_view json, subrequest_failure* why);
     void on_deadline(time_point now) override;
     void ask_known(time_point now);
+    void add_pools();
     void ask_all(time_point now);
     void follow();
     void finish();

@@ -4,6 +4,7 @@
 #include "node/local_node.hpp"
 #include "node/membership/gossip.hpp"
 #include "node/publish/feed_machine.hpp"
+#include "node/routing/other_pools.hpp"
 #include "node/tracing/span_recorder.hpp"
 #include "protocol/grammar.hpp"
 
@@ -379,6 +380,11 @@ peer_channels::place peer_channels::place_of(std::string_view target, const forw
     const auto& discovery = host_.discovery();
     if (discovery.expects_more()) {
         return {std::string{undiscovered}.append(target), std::string{target}};
+    }
+    if (const auto* const pools = host_.node().pools) {
+        if (auto address = pools->address_of(target); !address.empty()) {
+            return {std::move(address), {}};
+        }
     }
     throw error(errc::no_target, own_name + " cannot find '" + std::string{target} +
                                      "': " + discovery.unknown_reason() + "give its URL");

@@ -130,14 +130,19 @@ void connection::on_writable() {
 void connection::on_restart() {
     const auto keep = shared_from_this();
     marks_.reset();
+    on_bindings_lost("the publisher has restarted");
+    session_.asking().on_restart(host_->now());
+}
+
+void connection::on_bindings_lost(const std::string& why) {
+    const auto keep = shared_from_this();
     const auto at = host_->now();
     for (auto* const feed : std::vector{feeds_}) {
-        if (feed->is_bound()) { // a BIND that was not answered is sent again
+        if (feed->is_bound()) { // a BIND that was not answered is sent again, or fails
             unbind(*feed);
-            feed->on_lost("the publisher has restarted", at);
+            feed->on_lost(why, at);
         }
     }
-    session_.asking().on_restart(at);
 }
 
 // Over TLS, both ends get the newer roster, which may be why the peer does not answer.

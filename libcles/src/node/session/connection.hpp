@@ -65,6 +65,7 @@ class connection final : public link_events,
     [[gnu::cold]] void on_lost(boost::system::error_code why) override;
     void on_writable() override;
     [[gnu::cold]] void on_restart() override;
+    [[gnu::cold]] void on_bindings_lost(const std::string& why) override;
     [[gnu::cold]] void on_unanswered(bool lost) override;
 
     // flushable

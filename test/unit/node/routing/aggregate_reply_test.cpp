@@ -24,6 +24,28 @@ BOOST_AUTO_TEST_CASE(results_and_failures_are_separate) {
                                  R"("message":"full","retry_ms":7},"car4":{"error":"new","x":1}}})");
 }
 
+BOOST_AUTO_TEST_CASE(what_another_pool_has_replied_is_added_with_its_name) {
+    cles::core::aggregate_reply answer;
+    answer.add("car1", {.result = "{}"});
+    answer.add_pool("north",
+                    {.result = R"({"results":{"car1":{"value":1},"car2":[2]},"errors":{"car3":{"error":"busy"}},)"
+                               R"("more":{"x":1}})"});
+    answer.add_pool("west", {.failure = failure{.code = cles::errc::no_target, .message = "no known node offers it"}});
+    answer.add_pool("east", {.failure = failure{.code = cles::errc::unavailable, .message = "lost"}});
+    answer.add_pool("late", {});
+    BOOST_TEST(
+        answer.whole() ==
+        R"({"results":{"car1":{},"north.car1":{"value":1},"north.car2":[2]},"errors":{"north.car3":{"error":"busy"},)"
+        R"("east.all":{"error":"unavailable","message":"lost"},)"
+        R"("late.all":{"error":"deadline","message":"late.all did not answer in time"}}})");
+}
+
+BOOST_AUTO_TEST_CASE(pools_without_a_provider_add_nothing) {
+    cles::core::aggregate_reply answer;
+    answer.add_pool("west", {.failure = failure{.code = cles::errc::no_target, .message = "no known node offers it"}});
+    BOOST_TEST(answer.is_empty());
+}
+
 BOOST_AUTO_TEST_CASE(is_sent_an_eighth_before_the_deadline_but_at_most_50_ms) {
     const cles::time_point now{1h};
     BOOST_TEST((cles::core::answer_by(now + 5s, now) == now + 4950ms));

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/convert.hpp>
+
+#include "discovery/ask_all.hpp"
+#include "discovery/listed_node.hpp"
+#include "doctor/checks.hpp"
+#include "output/statistics.hpp"
+
+#include <boost/describe.hpp>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace tool {
+
+using namespace std::chrono_literals;
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr auto query_timeout = 1s;
+
+struct stated_pool {
+    std::string pool;
+    std::string state;
+};
+BOOST_DESCRIBE_STRUCT(stated_pool, (), (pool, state))
+
+struct stated_bridge {
+    std::string pool;
+    bool connected = false;
+    std::optional<std::string> problem;
+    std::vector<stated_pool> pools;
+    std::optional<std::uint64_t> round_trip_us;
+};
+BOOST_DESCRIBE_STRUCT(stated_bridge, (), (pool, connected, problem, pools, round_trip_us))
+
+struct stated_metrics {
+    std::optional<stated_bridge> federation; // only of bridges
+};
+BOOST_DESCRIBE_STRUCT(stated_metrics, (), (federation))
+
+void check_bridge(const std::string& node, const stated_bridge& bridge, findings& found) {
+    if (!bridge.connected) {
+        found.failure(
+            "federation", node + " is not connected to NATS" + (bridge.problem ? ": " + *bridge.problem : ""),
+            "check that the server of federation.nats in its configuration runs and is reachable, and the files "
+            "credentials, token and tls");
+        return;
+    }
+    if (bridge.problem) {
+        found.warning("federation", "NATS refuses a part of what " + node + " does: " + *bridge.problem,
+                      "permit its user the subjects of its pool (docs/federation.md, Security)");
+    }
+    if (!bridge.round_trip_us) {
+        found.warning("federation", node + " is connected to NATS, but does not receive its own heartbeats",
+                      "permit its user to publish cles." + bridge.pool + ".beat.*, and to subscribe to cles.*.beat.*");
+        return;
+    }
+    std::string lost;
+    for (const auto& pool : bridge.pools) {
+        if (pool.state != "live") {
+            lost.append(lost.empty() ? "" : ", ").append(pool.pool);
+        }
+    }
+    constexpr double us_per_ms = 1e3;
+    found.ok("federation", node + " reaches NATS and " + std::to_string(bridge.pools.size()) +
+                               (bridge.pools.size() == 1 ? " other pool; " : " other pools; ") + "a message takes " +
+                               fixed(static_cast<double>(*bridge.round_trip_us) / us_per_ms, 2) + " ms there and back");
+    if (!lost.empty()) {
+        found.warning("federation", node + " cannot reach any bridge of: " + lost,
+                      "run cles doctor there: the bridge has ended, or is not connected to the same NATS");
+    }
+}
+
+void check_bridge_of(const std::string& node, const node_answer& answer, findings& found) {
+    stated_metrics stated;
+    if (answer.error.empty() && cles::from_json(answer.json, stated) && stated.federation) {
+        check_bridge(node, *stated.federation, found);
+    }
+}
+
+} // namespace
+
+asio::awaitable<void> check_federation(client& requester, const std::vector<listed_node>& nodes, findings& found) {
+    auto urls = urls_of(nodes);
+    const auto answers = co_await ask_all(requester, "self:cles/metrics", std::move(urls), query_timeout);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        check_bridge_of(nodes[i].node, answers[i], found);
+    }
+}
+
+} // namespace tool

@@ -1,0 +1,738 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "federation/bridge.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "federation/carried_line.hpp"
+#include "protocol/grammar.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::bridging {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds per_bridge{4};            // of the interval between heartbeats
+constexpr milliseconds names_again_after{1'000}; // if nobody has answered
+constexpr milliseconds between_names{200};
+constexpr milliseconds soon{20}; // heartbeats that others ask for
+constexpr std::chrono::seconds at_home_within{10};
+constexpr std::chrono::seconds optimistic{1}; // after connecting, a pool that is not known may still appear
+constexpr std::chrono::minutes between_drop_logs{1};
+constexpr std::uint32_t upstream_keep = 1024;
+constexpr std::chrono::seconds remembered_for{10}; // after a bridge is lost, or before it is known
+constexpr std::size_t max_strange = 1024;
+
+constexpr std::string_view cancel_path = "cles/cancel/";
+constexpr std::string_view lost_line = "PUSH self:cles/lost";
+constexpr std::string_view names_line = "PULL self:cles/names";
+
+// "car1" of "north.car1".
+std::string_view without_pool(std::string_view target, std::string_view pool) {
+    const bool has_it = target.size() > pool.size() + 1 && target.starts_with(pool) && target[pool.size()] == '.';
+    return has_it ? target.substr(pool.size() + 1) : target;
+}
+
+std::string failure_text(const protocol::failure& why) {
+    std::string text;
+    protocol::append_failure(text, why);
+    return text;
+}
+
+std::string with_id(std::uint64_t id, std::string_view rest) {
+    return "id=" + std::to_string(id) + " " + std::string{rest};
+}
+
+bool is_error_reply(std::string_view rest) { return protocol::is_failure(rest); }
+
+} // namespace
+
+// -- the connection ------------------------------------------------------------------------------------------------
+
+void bridge::on_connected(std::uint64_t drawn, std::size_t max_message, time_point now) {
+    now_ = now;
+    connected_ = true;
+    connected_at_ = now;
+    pools_may_appear_ = true;
+    constexpr std::size_t around = 256; // the part of a line that is not in the message
+    max_message_ = std::min(max_message, setup_.max_line - std::min(around, setup_.max_line));
+    replaced_ = std::exchange(self_.instance, instance_text(drawn));
+    self_.pool = setup_.pool;
+    ++figures_.connections;
+    out_.subscribe(inbox_filter(self_), false);
+    out_.subscribe(std::string{heartbeat_filter}, false);
+    out_.subscribe(std::string{names_filter}, false);
+    if (!leaving_) {
+        for (const auto how : {verb::pull, verb::push, verb::delegate, verb::bind, verb::update}) {
+            out_.subscribe(request_filter(setup_.pool, how), true);
+        }
+    }
+    home_ = names_of(out_.home_names());
+    round_trip_.reset();
+    send_heartbeat(true);
+    due_ = next_heartbeat_;
+}
+
+void bridge::on_disconnected(std::string_view why) {
+    if (!std::exchange(connected_, false)) {
+        return;
+    }
+    due_ = time_point::max();
+    const auto text = "the connection to NATS was lost: " + std::string{why};
+    sent_.clear();
+    taken_.clear();
+    strange_.clear();
+    feeds_.clear();
+    published_.clear();
+    asked_names_.clear();
+    binds_.clear();
+    pools_.clear();
+    out_.lose_all(text);
+    out_.on_pools_changed();
+}
+
+void bridge::leave() {
+    if (!std::exchange(leaving_, true) && connected_) {
+        for (const auto how : {verb::pull, verb::push, verb::delegate, verb::bind, verb::update}) {
+            out_.unsubscribe(request_filter(setup_.pool, how));
+        }
+        send_heartbeat(false);
+    }
+}
+
+void bridge::on_time(time_point now) {
+    now_ = now;
+    if (!connected_) {
+        return;
+    }
+    if (due_ + interval() < now) { // this process did not run
+        pools_.note_suspension(now);
+    }
+    if (auto names = names_of(out_.home_names()); names.digest != home_.digest) {
+        home_ = std::move(names);
+        next_heartbeat_ = std::min(next_heartbeat_, now + soon);
+    }
+    if (pools_may_appear_ && connected_at_ + optimistic <= now) { // names may mean another pool now
+        pools_may_appear_ = false;
+        out_.on_pools_changed();
+    }
+    if (names_wanted_ && next_names_ <= now) {
+        send_names();
+    }
+    if (next_heartbeat_ <= now) {
+        send_heartbeat(false);
+    }
+    for (const auto& gone : pools_.expire(now)) {
+        on_lost(gone, "the bridge of the pool '" + gone.pool + "' was not received any more");
+    }
+    std::erase_if(strange_, [&](const auto& each) {
+        const bool is_over = each.second <= now;
+        if (is_over && !pools_.is_live(each.first)) {
+            taken_.forget(each.first);
+        }
+        return is_over;
+    });
+    sent_.on_time(now);
+    check_own_pool(now);
+    due_ = names_wanted_ ? std::min(next_heartbeat_, next_names_) : next_heartbeat_;
+}
+
+milliseconds bridge::interval() const {
+    return std::max(setup_.interval, per_bridge * static_cast<milliseconds::rep>(pools_.bridge_count()));
+}
+
+// -- messages ------------------------------------------------------------------------------------------------------
+
+void bridge::on_message(std::string_view where, std::string_view reply, std::string_view message, time_point now) {
+    now_ = now;
+    if (!connected_) {
+        return;
+    }
+    const auto about = parse_subject(where);
+    if (message.size() > max_message_) { // its line could not be read
+        drop(where, "it is too long");
+        if (about.kind == subject_kind::request) {
+            refuse_foreign(std::string{reply},
+                           {.code = errc::too_large,
+                            .message = "a request has at most " + std::to_string(max_message_) + " bytes here"});
+        }
+        return;
+    }
+    switch (about.kind) {
+    case subject_kind::request: take(about, reply, message, false); break;
+    case subject_kind::feed:
+        ++figures_.updates_received;
+        deliver(feeds_.on_update(about, message));
+        break;
+    case subject_kind::heartbeat: on_heartbeat(about, message, now); break;
+    case subject_kind::names: on_names(about, message); break;
+    case subject_kind::control: on_control(reply, message, now); break;
+    case subject_kind::reply: sent_.on_message(about.number, message); break;
+    case subject_kind::foreign: drop(where, "it is not a subject of CLES"); break;
+    }
+}
+
+void bridge::drop(std::string_view where, std::string_view why) {
+    ++figures_.messages_refused;
+    if (next_drop_log_ <= now_) {
+        next_drop_log_ = now_ + between_drop_logs;
+        out_.log(log_level::warning, "dropped a message of NATS on " + std::string{where.substr(0, 256)} + ": " +
+                                         std::string{why} + " (logged once a minute)");
+    }
+}
+
+// -- other bridges -------------------------------------------------------------------------------------------------
+
+void bridge::send_heartbeat(bool starting) {
+    next_heartbeat_ = now_ + interval();
+    const heartbeat said{.node = setup_.node,
+                         .interval = interval(),
+                         .names = home_.digest,
+                         .replaces = replaced_,
+                         .leaving = leaving_,
+                         .starting = starting};
+    if (!leaving_) {
+        pools_.on_heartbeat(self_, said, now_); // so that `publisher_of` considers it
+    }
+    heartbeat_sent_ = now_;
+    out_.publish(heartbeat_subject(self_), {}, text_of(said));
+}
+
+void bridge::on_heartbeat(const subject& from, std::string_view message, time_point now) {
+    const auto id = from.bridge();
+    if (id == self_) {
+        if (const auto sent = std::exchange(heartbeat_sent_, {})) {
+            round_trip_ = now - *sent;
+        }
+        return;
+    }
+    const auto said = parse_heartbeat(message);
+    if (!said) {
+        drop(heartbeat_subject(id), "it is not a heartbeat");
+        return;
+    }
+    if (!said->replaces.empty()) {
+        const bridge_id before{id.pool, said->replaces};
+        if (pools_.remove(before)) {
+            on_lost(before, "the bridge of the pool '" + id.pool + "' has connected to NATS again");
+        }
+    }
+    if (said->leaving) {
+        if (pools_.remove(id)) {
+            on_lost(id, "the bridge of the pool '" + id.pool + "' has left");
+        }
+        return;
+    }
+    switch (pools_.on_heartbeat(id, *said, now)) {
+    case pool_table::arrival::ignored: return;
+    case pool_table::arrival::returned: send_control(id, std::string{lost_line}); [[fallthrough]];
+    case pool_table::arrival::fresh:
+        out_.on_pools_changed();
+        if (said->starting) {
+            next_heartbeat_ = std::min(next_heartbeat_, now + soon);
+            due_ = std::min(due_, next_heartbeat_);
+        }
+        break;
+    case pool_table::arrival::known: break;
+    }
+    if (id.pool != setup_.pool && pools_.lacks_names(id.pool, said->names)) {
+        auto& asked = asked_names_[id];
+        if (asked + names_again_after <= now || asked == time_point{}) {
+            asked = now;
+            send_control(id, std::string{names_line});
+        }
+    }
+}
+
+void bridge::send_names() {
+    names_wanted_ = false;
+    next_names_ = now_ + between_names;
+    auto text = text_of(home_);
+    if (text.size() > max_message_) {
+        out_.log(log_level::warning, "the names of the pool's nodes do not fit into a message of NATS");
+        return;
+    }
+    out_.publish(names_subject(self_), {}, std::move(text));
+}
+
+void bridge::on_names(const subject& from, std::string_view message) {
+    if (from.pool == setup_.pool) {
+        return;
+    }
+    auto said = parse_names(message, pool_table::max_names);
+    if (!said) {
+        drop(names_subject(from.bridge()), "it is not a list of names");
+    } else if (pools_.set_names(from.pool, std::move(*said))) {
+        asked_names_.erase(from.bridge());
+        out_.on_pools_changed();
+    }
+}
+
+void bridge::send_control(const bridge_id& to, std::string line) {
+    out_.publish(control_subject(to), control_subject(self_), std::move(line));
+}
+
+void bridge::on_control(std::string_view reply, std::string_view message, time_point now) {
+    const auto from = parse_subject(reply);
+    const auto by = from.bridge();
+    protocol::request_line r;
+    protocol::malformed_request wrong;
+    if ((from.kind != subject_kind::control && from.kind != subject_kind::reply) ||
+        message.find('\n') != message.npos || !protocol::parse_request(message, r, wrong)) {
+        drop(control_subject(self_), "it is not a message of a bridge");
+        return;
+    }
+    if (r.verb == verb::bind && r.unbinds()) {
+        std::string noun{r.noun.target};
+        noun.append(":").append(r.noun.path);
+        if (published_.unbind(noun, by)) {
+            end_published(noun);
+        }
+    } else if (r.verb == verb::bind) {
+        take({.kind = subject_kind::request,
+              .pool = setup_.pool,
+              .verb = verb::bind,
+              .node = std::string{r.noun.target},
+              .task = std::string{r.noun.task}},
+             reply, message_of(r, {}), true);
+    } else if (message == names_line) {
+        names_wanted_ = true;
+        next_names_ = std::max(next_names_, now);
+        due_ = std::min(due_, next_names_);
+    } else if (message == lost_line) {
+        if (pools_.is_live(by)) { // it continues, but has forgotten what it had to do with this bridge
+            on_lost(by, "the bridge of the pool '" + by.pool + "' did not receive this one for a while");
+        }
+    } else if (r.noun.path.starts_with(cancel_path)) {
+        const auto number = protocol::parse_number(r.noun.path.substr(cancel_path.size()));
+        if (const auto id = number ? taken_.id_of(by, *number) : std::nullopt) {
+            cancel_taken(*id);
+        }
+    } else {
+        drop(control_subject(self_), "it is not a message of a bridge");
+    }
+}
+
+void bridge::on_lost(const bridge_id& gone, std::string_view why) {
+    ++figures_.bridges_lost;
+    asked_names_.erase(gone);
+    for (const auto id : taken_.requests_of(gone)) {
+        cancel_taken(id);
+        taken_.remove(id);
+    }
+    strange_.insert_or_assign(gone, now_ + remembered_for); // copies of its requests may still arrive
+    for (const auto& noun : published_.remove(gone)) {
+        end_published(noun);
+    }
+    if (!pools_.is_live(gone.pool)) {
+        sent_.close_pool(gone.pool);
+        for (const auto& each : feeds_.remove_pool(gone.pool)) {
+            unsubscribe_if_last(each);
+        }
+        out_.lose_pool(gone.pool, why);
+    } else {
+        sent_.on_lost(gone, why);
+        if (feeds_.depends_on(gone)) {
+            end_bindings(feeds_.remove_bound(gone.pool)); // the node binds these again
+            out_.lose_bindings(gone.pool, why);
+        }
+    }
+    out_.on_pools_changed();
+}
+
+// Two sites that use one name for their pools would get each other's requests.
+void bridge::check_own_pool(time_point now) {
+    const auto own = pools_.pools().find(setup_.pool);
+    if (own == pools_.pools().end()) {
+        return;
+    }
+    for (const auto& [instance, b] : own->second.bridges) {
+        if (instance != self_.instance && b.since + at_home_within <= now && b.node != setup_.node &&
+            !std::ranges::binary_search(home_.nodes, b.node) && strangers_.insert(b.node).second) {
+            out_.log(log_level::warning, "the bridge of '" + b.node + "' is of the pool '" + setup_.pool +
+                                             "' too, but that node is not known here: if it is at another site, give "
+                                             "that another pool's name");
+        }
+    }
+}
+
+// -- requests of the node ------------------------------------------------------------------------------------------
+
+std::string bridge::pool_of(std::string_view target, time_point now) const {
+    const auto dot = target.find('.');
+    const auto first = dot != std::string_view::npos && dot + 1 < target.size() ? target.substr(0, dot) : "";
+    if (!first.empty() && (first == setup_.pool || pools_.is_known(first))) {
+        return std::string{first};
+    }
+    if (const auto found = pools_.pool_of(target, setup_.pool); !found.empty()) {
+        return std::string{found};
+    }
+    const bool may_appear = !connected_ || connected_at_ + optimistic > now;
+    return may_appear && is_pool_name(first) ? std::string{first} : std::string{};
+}
+
+void bridge::on_line(const bridge_link& from, std::string_view line, time_point now) {
+    now_ = now;
+    if (!connected_) {
+        return; // the link is being lost
+    }
+    switch (from.what) {
+    case bridge_link::role::to_pool: send_request(from, line, now); break;
+    case bridge_link::role::from_pool: send_reply(line); break;
+    case bridge_link::role::publications:
+        if (line.starts_with("UPDATE ")) {
+            send_update(line);
+        } else {
+            send_bind_reply(line);
+        }
+        break;
+    }
+}
+
+void bridge::on_closed(const bridge_link& which) {
+    switch (which.what) {
+    case bridge_link::role::to_pool:
+        sent_.close(which);
+        end_bindings(feeds_.remove_link(which));
+        break;
+    case bridge_link::role::from_pool:
+        for (const auto id : taken_.requests_of(which.pool)) {
+            const auto reply = taken_.find(id)->reply;
+            taken_.remove(id);
+            refuse_foreign(reply, {.code = errc::unavailable, .message = setup_.node + " has closed the link"});
+        }
+        break;
+    case bridge_link::role::publications:
+        for (const auto& each : published_.clear()) {
+            send_control(each, std::string{lost_line});
+        }
+        break;
+    }
+}
+
+void bridge::answer(const bridge_link& on, std::uint64_t id, std::string_view reply) {
+    out_.deliver(on, with_id(id, reply));
+}
+
+void bridge::refuse(const bridge_link& on, std::uint64_t id, const protocol::failure& why) {
+    if (id != 0) {
+        answer(on, id, failure_text(why));
+    }
+}
+
+void bridge::deliver(std::vector<foreign_feeds::update> updates) {
+    for (auto& each : updates) {
+        out_.deliver(each.on, std::move(each.line));
+    }
+}
+
+// The node asks whether replies to BIND have marks.
+void bridge::answer_for_itself(const bridge_link& from, const protocol::request_line& r) {
+    if (r.verb == verb::push && r.noun.path.starts_with(cancel_path)) {
+        const auto id = protocol::parse_number(r.noun.path.substr(cancel_path.size()));
+        if (id && !binds_.contains(*id)) { // a binding is ended when it is known who holds it
+            sent_.cancel(*id);
+        }
+    } else if (r.verb == verb::pull && r.noun.path == "cles") {
+        if (r.id != 0) {
+            answer(from, r.id, R"({"pool":")" + from.pool + R"(","protocol":1,"features":["mark"]})");
+        }
+    } else if (r.noun.path != "cles/leaving") {
+        refuse(from, r.id, {.code = errc::no_target, .message = "'self' is no node of the pool '" + from.pool + "'"});
+    }
+}
+
+void bridge::send_request(const bridge_link& from, std::string_view line, time_point now) {
+    protocol::request_line r;
+    protocol::malformed_request wrong;
+    if (protocol::is_reply(line) || !protocol::parse_request(line, r, wrong) || r.is_update()) {
+        return; // the node itself writes these lines
+    }
+    if (r.noun.target == "self") {
+        answer_for_itself(from, r);
+    } else if (r.id != 0 && r.verb == verb::bind) { // without an id, nothing could be answered
+        send_bind(from, r, now);
+    } else if (r.id != 0) {
+        publish_request(from, r, now);
+    }
+}
+
+void bridge::publish_request(const bridge_link& from, const protocol::request_line& r, time_point now) {
+    const auto& pool = from.pool;
+    const auto number = sent_.add(from, r.id, now + milliseconds{r.deadline_ms}, now);
+    auto message = pool == setup_.pool ? message_within_pool(r) : message_of(r, setup_.pool);
+    if (message.size() > max_message_) {
+        sent_.on_message(number, failure_text({.code = errc::too_large,
+                                               .message = "a request through NATS has at most " +
+                                                          std::to_string(max_message_) + " bytes here"}));
+        return;
+    }
+    ++figures_.requests_sent;
+    if (!out_.publish(request_subject(pool, r.verb, without_pool(r.noun.target, pool), r.noun.task),
+                      reply_subject(self_, number), std::move(message))) {
+        sent_.on_message(number, failure_text({.code = errc::busy,
+                                               .message = "too much waits to be sent to NATS",
+                                               .retry_ms = protocol::default_retry_ms}));
+    }
+}
+
+void bridge::send_bind(const bridge_link& from, const protocol::request_line& r, time_point now) {
+    const foreign_noun noun{.pool = from.pool,
+                            .node = std::string{without_pool(r.noun.target, from.pool)},
+                            .task = std::string{r.noun.task},
+                            .parameters = std::string{r.noun.path.substr(r.noun.task.size())},
+                            .target = std::string{r.noun.target},
+                            .link = from.number};
+    if (protocol::is_reserved_target(noun.node)) {
+        refuse(from, r.id, {.code = errc::no_target, .message = "a binding in another pool needs the name of a node"});
+        return;
+    }
+    if (r.unbinds()) {
+        if (auto gone = feeds_.remove(noun)) {
+            end_bindings({std::move(*gone)});
+        }
+        answer(from, r.id, "{}");
+        return;
+    }
+    // First, so that no update is missed after the reply.
+    if (feeds_.add(noun, r.id)) {
+        out_.subscribe(noun.subject(), false);
+    }
+    binds_.insert_or_assign(r.id, noun);
+    publish_request(from, r, now);
+}
+
+void bridge::unsubscribe_if_last(const foreign_feeds::removed& gone) {
+    if (gone.is_last) {
+        out_.unsubscribe(gone.noun.subject());
+    }
+}
+
+// Ends them at the bridges that hold them.
+void bridge::end_bindings(const std::vector<foreign_feeds::removed>& ended) {
+    for (const auto& gone : ended) {
+        unsubscribe_if_last(gone);
+        if (!gone.taker.empty() && gone.is_only) {
+            end_binding_at(gone.taker, gone.noun);
+        }
+    }
+}
+
+void bridge::end_binding_at(const std::string& taker, const foreign_noun& noun) {
+    send_control({noun.pool, taker}, text_of(verb::bind, noun.node, noun.task, noun.parameters + " lease=0"));
+}
+
+void bridge::on_answer(const bridge_link& on, std::uint64_t id, std::string_view reply, std::string_view taker) {
+    answer(on, id, reply);
+    const auto bind = binds_.extract(id);
+    if (bind.empty()) {
+        return;
+    }
+    if (is_error_reply(reply)) {
+        if (const auto gone = feeds_.remove(id)) {
+            unsubscribe_if_last(*gone);
+        }
+        return;
+    }
+    if (!feeds_.has(bind.mapped()) && !taker.empty()) { // the node has ended it meanwhile
+        end_binding_at(std::string{taker}, bind.mapped());
+    }
+    deliver(feeds_.on_bound(id, taker));
+}
+
+void bridge::cancel_at(const bridge_id& taker, std::uint64_t number) {
+    out_.publish(control_subject(taker), reply_subject(self_, number),
+                 "PUSH self:" + std::string{cancel_path} + std::to_string(number));
+}
+
+// -- requests of other pools ---------------------------------------------------------------------------------------
+
+void bridge::refuse_foreign(const std::string& reply, const protocol::failure& why) {
+    if (!reply.empty()) {
+        out_.publish(reply, {}, failure_text(why));
+    }
+}
+
+void bridge::take(const subject& about, std::string_view reply, std::string_view message, bool is_passed_on) {
+    const std::string answer_at{reply};
+    const auto text = text_of(about.verb, about.node, about.task, message);
+    protocol::request_line r;
+    protocol::malformed_request wrong;
+    if (text.find('\n') != std::string::npos) {
+        wrong.why = "a message of NATS holds one line";
+    } else if (protocol::parse_request(text, r, wrong) && r.is_update()) {
+        wrong.why = "an update with 'seq' and 'epoch' is not a request";
+    }
+    if (!wrong.why.empty()) {
+        drop(request_subject(about.pool, about.verb, about.node, about.task), wrong.why);
+        refuse_foreign(answer_at, {.code = errc::bad_request, .message = wrong.why});
+        return;
+    }
+    if (r.noun.target == "self" || (r.noun.task == "cles" && r.verb != verb::pull)) {
+        refuse_foreign(answer_at, {.code = errc::no_target,
+                                   .message = "requests to the task 'cles' that concern a link do not cross NATS"});
+        return;
+    }
+    const auto from = parse_subject(reply);
+    taken_requests::request by{.by = {}, .number = 0, .reply = answer_at};
+    if (from.kind == subject_kind::reply) {
+        by.by = from.bridge();
+        by.number = from.number;
+    }
+    if (by.by.pool != setup_.pool && has_passed(r.via, setup_.pool)) {
+        refuse_foreign(answer_at, {.code = errc::no_target,
+                                   .message = "the request has passed through the pool '" + setup_.pool +
+                                              "' before: the pools in 'via' form a loop"});
+        return;
+    }
+    if (r.verb == verb::bind) {
+        take_bind(r, by, is_passed_on);
+        return;
+    }
+    if (!r.wants_reply || answer_at.empty()) {
+        by.reply.clear();
+    }
+    const bridge_link on{bridge_link::role::from_pool, by.by.pool};
+    if (!by.by.pool.empty() && !remember(by.by)) {
+        refuse_foreign(answer_at, {.code = errc::busy,
+                                   .message = "too many bridges that are not known here ask",
+                                   .retry_ms = protocol::default_retry_ms});
+        return;
+    }
+    const auto id = taken_.add(std::move(by));
+    if (!id) {
+        ++figures_.messages_refused; // it has arrived before
+        return;
+    }
+    ++figures_.requests_taken;
+    out_.deliver(on, line_of(r, *id));
+    if (!r.wants_reply) {
+        taken_.remove(*id);
+    }
+}
+
+// Whether its requests can be recognised if they arrive again. It may not be known yet.
+bool bridge::remember(const bridge_id& by) {
+    if (pools_.is_live(by)) {
+        return true;
+    }
+    if (strange_.size() >= max_strange && !strange_.contains(by)) {
+        return false;
+    }
+    strange_.insert_or_assign(by, now_ + remembered_for);
+    return true;
+}
+
+void bridge::on_batch() {
+    for (const auto* open : taken_.take_unacknowledged()) {
+        if (!open->reply.empty()) {
+            out_.publish(open->reply, {}, taken_text(self_.instance));
+        }
+    }
+}
+
+void bridge::cancel_taken(std::uint64_t id) {
+    if (const auto* r = taken_.find(id)) {
+        out_.deliver({bridge_link::role::from_pool, r->by.pool},
+                     "PUSH self:" + std::string{cancel_path} + std::to_string(id) + " reply=no");
+    }
+}
+
+void bridge::send_reply(std::string_view line) {
+    const auto parts = split_reply(line);
+    const auto* r = parts.id == 0 ? nullptr : taken_.find(parts.id);
+    if (r == nullptr) {
+        return; // nobody waits
+    }
+    if (!r->reply.empty()) {
+        if (parts.rest.size() <= max_message_) {
+            out_.publish(r->reply, {}, std::string{parts.rest});
+        } else if (!parts.is_interim) {
+            refuse_foreign(r->reply, {.code = errc::too_large,
+                                      .message = "the reply has " + std::to_string(parts.rest.size()) +
+                                                 " bytes; NATS permits " + std::to_string(max_message_) + " here",
+                                      .ran = true});
+        }
+    }
+    if (!parts.is_interim) {
+        taken_.remove(parts.id);
+    }
+}
+
+// -- nouns for other pools -----------------------------------------------------------------------------------------
+
+void bridge::take_bind(const protocol::request_line& r, const taken_requests::request& by, bool is_passed_on) {
+    if (by.by.pool.empty()) {
+        refuse_foreign(by.reply, {.code = errc::bad_request, .message = "only bridges bind through NATS"});
+        return;
+    }
+    if (!pools_.is_live(by.by)) { // nobody would notice its loss
+        refuse_foreign(by.reply, {.code = errc::busy,
+                                  .message = "the bridge that binds is not known here yet",
+                                  .retry_ms = static_cast<std::uint64_t>(setup_.interval.count())});
+        return;
+    }
+    std::string noun{r.noun.target};
+    noun.append(":").append(r.noun.path);
+    const auto publisher = pools_.publisher_of(setup_.pool, noun);
+    if (!is_passed_on && publisher != self_.instance && !publisher.empty()) {
+        out_.publish(control_subject({setup_.pool, std::string{publisher}}), by.reply,
+                     text_of(verb::bind, r.noun.target, r.noun.task, message_of(r, {})));
+        return;
+    }
+    ++figures_.requests_taken;
+    out_.publish(by.reply, {}, taken_text(self_.instance));
+    if (const auto id = published_.bind(noun, {by.by, by.reply}); id != 0) {
+        std::string line = "BIND " + noun + " id=" + std::to_string(id) + " deadline=" + std::to_string(r.deadline_ms) +
+                           " keep=" + std::to_string(upstream_keep) + " mark=yes hops=" + std::to_string(r.hops);
+        if (!r.via.empty()) {
+            line.append(" via=").append(r.via);
+        }
+        out_.deliver({bridge_link::role::publications, {}}, std::move(line));
+    }
+}
+
+void bridge::send_bind_reply(std::string_view line) {
+    const auto parts = split_reply(line);
+    if (parts.id == 0) {
+        return;
+    }
+    const auto answered = published_.on_reply(parts.id, is_error_reply(parts.rest));
+    for (const auto& to : answered.to) {
+        if (parts.rest.size() + max_pool_name <= max_message_) {
+            out_.publish(to, {}, taken_text(self_.instance) + " " + std::string{parts.rest});
+        } else { // it is bound nevertheless, without a value
+            out_.publish(to, {}, taken_text(self_.instance) + " {}");
+        }
+    }
+    if (answered.ends) {
+        end_published(answered.noun);
+    }
+}
+
+void bridge::send_update(std::string_view line) {
+    constexpr std::string_view verb_text = "UPDATE ";
+    const auto text = line.substr(verb_text.size());
+    const auto noun = text.substr(0, text.find(' '));
+    const auto colon = noun.find(':');
+    if (colon == std::string_view::npos) {
+        return;
+    }
+    const auto task = noun.substr(colon + 1, noun.find('/') == std::string_view::npos ? std::string_view::npos
+                                                                                      : noun.find('/') - colon - 1);
+    auto message = std::string{text.substr(colon + 1 + task.size())};
+    if (message.size() > max_message_) { // shows as a gap
+        return;
+    }
+    ++figures_.updates_sent;
+    out_.publish(feed_subject(setup_.pool, noun.substr(0, colon), task), {}, std::move(message));
+}
+
+void bridge::end_published(const std::string& noun) {
+    out_.deliver({bridge_link::role::publications, {}},
+                 "BIND " + noun + " id=" + std::to_string(published_.next_id()) + " lease=0");
+}
+
+} // namespace cles::bridging

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+#include <cles/log.hpp>
+
+#include "federation/bridge_link.hpp"
+#include "federation/foreign_feeds.hpp"
+#include "federation/heartbeat.hpp"
+#include "federation/pool_table.hpp"
+#include "federation/published_nouns.hpp"
+#include "federation/sent_requests.hpp"
+#include "federation/subject.hpp"
+#include "federation/taken_requests.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::bridging {
+
+/// What a bridge does outside itself. None of it calls the bridge.
+class bridge_output {
+  public:
+    bridge_output() = default;
+    bridge_output(const bridge_output&) = delete;
+    bridge_output& operator=(const bridge_output&) = delete;
+
+    /// Returns false if too much waits already.
+    virtual bool publish(std::string subject, std::string reply, std::string message) = 0;
+    /// \param shared one bridge of the pool receives each message
+    virtual void subscribe(std::string subject, bool shared) = 0;
+    virtual void unsubscribe(const std::string& subject) = 0;
+
+    /// A line for the node, without LF. Opens the link if it is not `to_pool` and not open.
+    virtual void deliver(const bridge_link& on, std::string line) = 0;
+    /// The links to and from that pool are lost.
+    virtual void lose_pool(std::string_view pool, std::string_view why) = 0;
+    virtual void lose_all(std::string_view why) = 0;
+    /// The bindings on the links to the pool are lost.
+    virtual void lose_bindings(std::string_view pool, std::string_view why) = 0;
+    /// There are other pools, or other nodes in them.
+    virtual void on_pools_changed() = 0;
+
+    /// The names of the nodes of the own pool, this one included.
+    [[nodiscard]] virtual std::vector<std::string> home_names() const = 0;
+    virtual void log(log_level level, const std::string& text) = 0;
+
+  protected:
+    ~bridge_output() = default;
+};
+
+/// Joins a pool to others through NATS: passes requests of the node to other pools, and theirs to the node
+/// (docs/federation.md). It does no input or output; time is a parameter.
+///
+/// To the node, it is the other end of links that carry lines. On them, ids are the node's on links to pools, and this
+/// object's on the others.
+class bridge final : private sent_requests_events {
+  public:
+    struct settings {
+        std::string pool;
+        std::string node;
+        std::size_t max_line = 1U << 20U;        ///< in bytes, of the node's links
+        std::chrono::milliseconds interval{400}; ///< the shortest between heartbeats
+    };
+    struct figures {
+        std::uint64_t requests_sent = 0;
+        std::uint64_t requests_taken = 0;
+        std::uint64_t updates_sent = 0;
+        std::uint64_t updates_received = 0;
+        std::uint64_t messages_refused = 0; ///< not of this protocol, or repeated
+        std::uint64_t bridges_lost = 0;
+        std::uint64_t connections = 0;
+    };
+
+    bridge(settings setup, bridge_output& out) : setup_(std::move(setup)), out_(out), sent_(*this) {}
+
+    /// Connected to NATS, and not subscribed to anything. \param drawn at random \param max_message in bytes
+    void on_connected(std::uint64_t drawn, std::size_t max_message, time_point now);
+    void on_disconnected(std::string_view why);
+    void on_message(std::string_view where, std::string_view reply, std::string_view message, time_point now);
+    /// The messages of one read have been passed, and the node has replied to those that it answers at once.
+    void on_batch();
+    /// To be called at `due`, and when the node's pool has changed.
+    void on_time(time_point now);
+    [[nodiscard]] time_point due() const noexcept { return due_; }
+    /// Takes no more requests, and tells the others.
+    void leave();
+
+    /// A line of the node, without LF.
+    void on_line(const bridge_link& from, std::string_view line, time_point now);
+    /// The node has closed the link.
+    void on_closed(const bridge_link& which);
+
+    /// Which pool has that node: "north" for "north.car1", or for "car1" if that is a node of north. Empty if it is not
+    /// known.
+    [[nodiscard]] std::string pool_of(std::string_view target, time_point now) const;
+    /// Whether requests can be sent to that pool now.
+    [[nodiscard]] bool is_live(std::string_view pool) const { return connected_ && pools_.is_live(pool); }
+    [[nodiscard]] bool is_connected() const noexcept { return connected_; }
+    [[nodiscard]] const pool_table& pools() const noexcept { return pools_; }
+    [[nodiscard]] const figures& counted() const noexcept { return figures_; }
+    /// How long the last own heartbeat took to the server and back. Nothing if none has come back since the connection
+    /// was made: it may not be permitted to publish or receive heartbeats.
+    [[nodiscard]] std::optional<time_point::duration> round_trip() const noexcept { return round_trip_; }
+    [[nodiscard]] const bridge_id& self() const noexcept { return self_; }
+
+  private:
+    // Requests of the node.
+    void send_request(const bridge_link& from, std::string_view line, time_point now);
+    void send_bind(const bridge_link& from, const protocol::request_line& r, time_point now);
+    void publish_request(const bridge_link& from, const protocol::request_line& r, time_point now);
+    void end_bindings(const std::vector<foreign_feeds::removed>& ended);
+    void end_binding_at(const std::string& taker, const foreign_noun& noun);
+    void answer(const bridge_link& on, std::uint64_t id, std::string_view reply);
+    void refuse(const bridge_link& on, std::uint64_t id, const protocol::failure& why);
+    void answer_for_itself(const bridge_link& from, const protocol::request_line& r);
+    void deliver(std::vector<foreign_feeds::update> updates);
+    void unsubscribe_if_last(const foreign_feeds::removed& gone);
+
+    // Requests of other pools.
+    void take(const subject& about, std::string_view reply, std::string_view message, bool is_passed_on);
+    void take_bind(const protocol::request_line& r, const taken_requests::request& by, bool is_passed_on);
+    void send_reply(std::string_view line);
+    void send_bind_reply(std::string_view line);
+    void send_update(std::string_view line);
+    void cancel_taken(std::uint64_t id);
+    void end_published(const std::string& noun);
+    void refuse_foreign(const std::string& reply, const protocol::failure& why);
+    void drop(std::string_view where, std::string_view why);
+    bool remember(const bridge_id& by);
+
+    // Other bridges.
+    void on_heartbeat(const subject& from, std::string_view message, time_point now);
+    void on_names(const subject& from, std::string_view message);
+    void on_control(std::string_view reply, std::string_view message, time_point now);
+    void on_lost(const bridge_id& gone, std::string_view why);
+    void send_heartbeat(bool starting);
+    void send_names();
+    void send_control(const bridge_id& to, std::string line);
+    void check_own_pool(time_point now);
+    [[nodiscard]] std::chrono::milliseconds interval() const;
+
+    // sent_requests_events
+    void on_answer(const bridge_link& on, std::uint64_t id, std::string_view reply, std::string_view taker) override;
+    void cancel_at(const bridge_id& taker, std::uint64_t number) override;
+
+    const settings setup_;
+    bridge_output& out_;
+    bridge_id self_{};
+    std::string replaced_; // the instance before
+    std::size_t max_message_ = 0;
+    bool connected_ = false;
+    bool leaving_ = false;
+    time_point connected_at_{};
+    bool pools_may_appear_ = false; // names with their prefix are taken for theirs
+    time_point now_{};
+    time_point due_{time_point::max()};
+    time_point next_heartbeat_{};
+    std::optional<time_point> heartbeat_sent_; // nothing: it has come back
+    std::optional<time_point::duration> round_trip_;
+    time_point next_names_{};
+    time_point next_drop_log_{};
+    bool names_wanted_ = false;
+    node_names home_;
+    pool_table pools_;
+    sent_requests sent_;
+    taken_requests taken_;
+    std::map<bridge_id, time_point> strange_; // that have asked and are not live, and when they are forgotten
+    foreign_feeds feeds_;
+    std::map<std::uint64_t, foreign_noun> binds_; // that are not answered, by the node's id
+    published_nouns published_;
+    std::map<bridge_id, time_point> asked_names_; // and when
+    std::set<std::string> strangers_;             // bridges of the own pool that are not at home, and were logged
+    figures figures_;
+};
+
+} // namespace cles::bridging

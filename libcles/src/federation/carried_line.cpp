@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "federation/carried_line.hpp"
+
+#include "protocol/grammar.hpp"
+
+#include <algorithm>
+#include <optional>
+
+namespace cles::bridging {
+namespace {
+
+// Appends the adverbs, without `id`, and the body. \param home of the names in `via`; nothing: `via` is left out
+void append_rest(std::string& out, const protocol::request_line& r, std::optional<std::string_view> home) {
+    protocol::part_reader parts{r.text};
+    parts.next(); // verb
+    parts.next(); // noun
+    for (auto part = parts.next(); !part.empty(); part = parts.next()) {
+        const bool is_via = part.starts_with("via=");
+        if (part.starts_with("id=") || (is_via && !home)) {
+            continue;
+        }
+        out.push_back(' ');
+        if (!is_via || home->empty()) {
+            out.append(part);
+            continue;
+        }
+        out.append("via=");
+        for (auto left = r.via; !left.empty();) {
+            const auto comma = left.find(',');
+            const auto from = out.size();
+            out.append(*home).append(".").append(left.substr(0, comma));
+            out.resize(std::min(out.size(), from + protocol::max_name)); // the pool is what ends loops
+            left.remove_prefix(comma == std::string_view::npos ? left.size() : comma + 1);
+            if (!left.empty()) {
+                out.push_back(',');
+            }
+        }
+    }
+    if (!r.body.empty()) {
+        out.append(" ").append(r.body);
+    }
+}
+
+} // namespace
+
+std::string message_of(const protocol::request_line& request, std::string_view home) {
+    std::string made{request.noun.path.substr(request.noun.task.size())};
+    append_rest(made, request, home);
+    return made;
+}
+
+std::string message_within_pool(const protocol::request_line& request) {
+    std::string made{request.noun.path.substr(request.noun.task.size())};
+    append_rest(made, request, {});
+    return made;
+}
+
+std::string line_of(const protocol::request_line& request, std::uint64_t id) {
+    std::string made{to_string(request.verb)};
+    made.append(" ").append(request.noun.target).append(":").append(request.noun.path);
+    made.append(" id=").append(std::to_string(id));
+    append_rest(made, request, std::string_view{});
+    return made;
+}
+
+std::string text_of(verb how, std::string_view node, std::string_view task, std::string_view message) {
+    std::string made{to_string(how)};
+    made.append(" ").append(node).append(":").append(task);
+    if (!message.empty() && message.front() != '/' && message.front() != ' ') {
+        made.push_back(' ');
+    }
+    return made.append(message);
+}
+
+bool has_passed(std::string_view via, std::string_view pool) noexcept {
+    while (!via.empty()) {
+        const auto comma = via.find(',');
+        const auto node = via.substr(0, comma);
+        if (node.size() > pool.size() && node.starts_with(pool) && node[pool.size()] == '.') {
+            return true;
+        }
+        via.remove_prefix(comma == std::string_view::npos ? via.size() : comma + 1);
+    }
+    return false;
+}
+
+reply_parts split_reply(std::string_view line) noexcept {
+    constexpr std::string_view key = "id=";
+    if (!line.starts_with(key)) {
+        return {};
+    }
+    line.remove_prefix(key.size());
+    const auto space = line.find(' ');
+    const auto id = protocol::number_between(line.substr(0, space), 1, protocol::max_id);
+    if (!id || space == std::string_view::npos) {
+        return {};
+    }
+    line.remove_prefix(space + 1);
+    return {.id = *id, .rest = line, .is_interim = line.starts_with("progress=")};
+}
+
+} // namespace cles::bridging

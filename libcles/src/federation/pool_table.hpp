@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include "federation/heartbeat.hpp"
+#include "federation/subject.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::bridging {
+
+/// The pools, their bridges, and the names of their nodes, as the bridges state them.
+class pool_table {
+  public:
+    static constexpr std::size_t max_pools = 1024;
+    static constexpr std::size_t max_bridges = 4096;
+    static constexpr std::size_t max_names = 65'536;
+
+    struct bridge {
+        std::string node;
+        std::chrono::milliseconds interval{0};
+        std::string names; ///< the digest that it states
+        time_point heard;
+        time_point since; ///< when it was first received
+    };
+    struct pool {
+        std::map<std::string, bridge, std::less<>> bridges; ///< that are live, by instance
+        node_names names;                                   ///< the last that were received
+    };
+    enum class arrival : std::uint8_t {
+        known,
+        fresh,
+        returned, ///< it was taken for lost
+        ignored   ///< there are too many
+    };
+
+    /// A bridge says that it lives.
+    arrival on_heartbeat(const bridge_id& from, const heartbeat& said, time_point now);
+    /// Removes a bridge. Returns false if it is not known.
+    bool remove(const bridge_id& gone);
+    /// Removes those that were silent for too long, and returns them.
+    std::vector<bridge_id> expire(time_point now);
+    /// Nothing could be received for a while: silence counts from now on.
+    void note_suspension(time_point now);
+    /// All bridges are unknown from now on. The pools, and the names of their nodes, remain known.
+    void clear();
+
+    /// Returns whether anything has changed.
+    bool set_names(std::string_view of, node_names said);
+    /// Whether the names with that digest are to be asked for.
+    [[nodiscard]] bool lacks_names(std::string_view of, std::string_view digest) const;
+
+    [[nodiscard]] bool is_known(std::string_view name) const { return pools_.contains(name); }
+    [[nodiscard]] bool is_live(std::string_view name) const;
+    [[nodiscard]] bool is_live(const bridge_id& which) const;
+    [[nodiscard]] std::size_t bridge_count() const noexcept { return bridge_count_; }
+    /// The pool that has a node of this name, apart from `except`; live ones first. Empty if there is none.
+    [[nodiscard]] std::string_view pool_of(std::string_view node, std::string_view except) const;
+    /// The bridge of the pool that publishes this noun for other pools. All who know the same bridges select the same
+    /// one. Empty if there is none.
+    [[nodiscard]] std::string_view publisher_of(std::string_view of, std::string_view noun) const;
+    [[nodiscard]] const std::map<std::string, pool, std::less<>>& pools() const noexcept { return pools_; }
+
+  private:
+    std::map<std::string, pool, std::less<>> pools_;
+    std::set<bridge_id> lost_; ///< for lack of heartbeats
+    std::size_t bridge_count_ = 0;
+};
+
+} // namespace cles::bridging

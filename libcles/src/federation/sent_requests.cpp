@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "federation/sent_requests.hpp"
+
+#include "protocol/reply_line.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::bridging {
+namespace {
+
+constexpr std::string_view taken_key = "taken=";
+constexpr std::chrono::seconds after_deadline{1}; // until a reply is not expected any more
+
+} // namespace
+
+std::string taken_text(std::string_view instance) { return std::string{taken_key}.append(instance); }
+
+std::string_view take_taker(std::string_view& message) noexcept {
+    if (!message.starts_with(taken_key)) {
+        return {};
+    }
+    const auto end = std::min(message.find(' '), message.size());
+    const auto instance = message.substr(taken_key.size(), end - taken_key.size());
+    if (!is_instance(instance)) {
+        return {};
+    }
+    message.remove_prefix(std::min(end + 1, message.size()));
+    return instance;
+}
+
+std::uint64_t sent_requests::add(const bridge_link& from, std::uint64_t id, time_point due, time_point now) {
+    const auto number = ++last_;
+    sent_.emplace(number, request{.from = from,
+                                  .id = id,
+                                  .acknowledged_by = now + acknowledged_within,
+                                  .forgotten_at = due + after_deadline});
+    numbers_.insert_or_assign(id, number);
+    return number;
+}
+
+sent_requests::requests::iterator sent_requests::erase(requests::iterator which) {
+    if (const auto found = numbers_.find(which->second.id);
+        found != numbers_.end() && found->second == which->first) { // a cancelled one has none
+        numbers_.erase(found);
+    }
+    return sent_.erase(which);
+}
+
+void sent_requests::on_message(std::uint64_t number, std::string_view message) {
+    const auto taker = take_taker(message);
+    const auto found = sent_.find(number);
+    if (found == sent_.end()) {
+        return;
+    }
+    if (!taker.empty()) {
+        on_taken(found, taker);
+    }
+    const auto again = sent_.find(number);
+    if (message.empty() || again == sent_.end()) {
+        return;
+    }
+    if (message.starts_with("progress=")) {
+        if (!again->second.is_cancelled) {
+            events_.on_answer(again->second.from, again->second.id, message, again->second.taker);
+        }
+        return;
+    }
+    const auto answered = std::move(again->second);
+    const auto id = answered.id;
+    erase(sent_.find(number));
+    if (!answered.is_cancelled) {
+        events_.on_answer(answered.from, id, message, answered.taker);
+    }
+}
+
+void sent_requests::on_taken(requests::iterator which, std::string_view taker) {
+    auto& r = which->second;
+    if (r.is_cancelled) {
+        events_.cancel_at({r.from.pool, std::string{taker}}, which->first);
+        erase(which);
+    } else if (r.taker.empty()) {
+        r.taker = taker;
+    }
+}
+
+void sent_requests::cancel(std::uint64_t id) {
+    const auto number = numbers_.find(id);
+    if (number == numbers_.end()) {
+        return;
+    }
+    const auto which = sent_.find(number->second);
+    auto& r = which->second;
+    if (r.taker.empty()) {
+        r.is_cancelled = true;
+        numbers_.erase(number);
+    } else {
+        events_.cancel_at({r.from.pool, r.taker}, which->first);
+        erase(which);
+    }
+}
+
+void sent_requests::fail(requests::iterator which, std::string_view why) {
+    const auto failed = std::move(which->second);
+    const auto number = which->first;
+    erase(sent_.find(number));
+    if (!failed.is_cancelled) {
+        std::string text;
+        protocol::append_failure(text, {.code = errc::unavailable, .message = std::string{why}});
+        events_.on_answer(failed.from, failed.id, text, {});
+    }
+}
+
+void sent_requests::on_lost(const bridge_id& taker, std::string_view why) {
+    std::vector<std::uint64_t> lost;
+    for (const auto& [number, r] : sent_) {
+        if (r.taker == taker.instance && r.from.pool == taker.pool) {
+            lost.push_back(number);
+        }
+    }
+    for (const auto number : lost) {
+        if (const auto found = sent_.find(number); found != sent_.end()) {
+            fail(found, why);
+        }
+    }
+}
+
+void sent_requests::on_time(time_point now) {
+    std::vector<std::uint64_t> late;
+    for (auto at = sent_.begin(); at != sent_.end();) {
+        const auto& r = at->second;
+        if (r.forgotten_at <= now) { // the node has given up by itself
+            at = erase(at);
+            continue;
+        }
+        if (r.taker.empty() && !r.is_cancelled && r.acknowledged_by <= now) {
+            late.push_back(at->first);
+        }
+        ++at;
+    }
+    for (const auto number : late) {
+        const auto found = sent_.find(number);
+        if (found == sent_.end()) {
+            continue;
+        }
+        // It remains, so that a bridge that acknowledges it later is told.
+        auto waiting = found->second;
+        waiting.is_cancelled = true;
+        fail(found, "no bridge of the pool '" + waiting.from.pool + "' acknowledged the request");
+        sent_.emplace(number, std::move(waiting));
+    }
+}
+
+template <class Condition>
+void sent_requests::cancel_if(Condition concerns) {
+    std::vector<std::uint64_t> ids;
+    for (const auto& [number, r] : sent_) {
+        if (!r.is_cancelled && concerns(r)) {
+            ids.push_back(r.id);
+        }
+    }
+    for (const auto id : ids) {
+        cancel(id);
+    }
+}
+
+void sent_requests::close(const bridge_link& link) {
+    cancel_if([&link](const request& r) { return r.from == link; });
+}
+
+void sent_requests::close_pool(std::string_view pool) {
+    cancel_if([pool](const request& r) { return r.from.pool == pool; });
+}
+
+void sent_requests::clear() {
+    sent_.clear();
+    numbers_.clear();
+}
+
+} // namespace cles::bridging

@@ -1,0 +1,526 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "nats/federated_pools.hpp"
+
+#include <cles/error.hpp>
+#include <cles/json_writer.hpp>
+
+#include "node/local_node.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace cles::nats {
+namespace asio = boost::asio;
+using bridging::bridge_link;
+
+namespace {
+
+constexpr std::size_t events_per_batch = 256;
+constexpr int batches_per_turn = 8;
+constexpr std::chrono::milliseconds pool_appears_within{2'000};
+
+class dial_errors final : public boost::system::error_category {
+  public:
+    [[nodiscard]] const char* name() const noexcept override { return "cles.federation"; }
+    [[nodiscard]] std::string message(int) const override { return "none of its bridges is connected to NATS"; }
+};
+
+boost::system::error_code no_bridge() {
+    static const dial_errors category;
+    return {1, category};
+}
+
+class pool_acceptor final : public acceptor {
+  public:
+    explicit pool_acceptor(std::shared_ptr<federated_pools> by) : by_(std::move(by)) {}
+    ~pool_acceptor() override { by_->leave(); }
+    pool_acceptor(const pool_acceptor&) = delete;
+    pool_acceptor& operator=(const pool_acceptor&) = delete;
+
+    [[nodiscard]] url local() const override {
+        return {.scheme = "pool", .host = by_->own_pool(), .port = 0, .path = {}};
+    }
+    void start(std::function<void(link_ptr)> on_link) override { by_->accept(std::move(on_link)); }
+    void close() override { by_->leave(); }
+
+  private:
+    std::shared_ptr<federated_pools> by_;
+};
+
+class pool_transport final : public link_transport {
+  public:
+    explicit pool_transport(std::weak_ptr<federated_pools> by) : by_(std::move(by)) {}
+
+    [[nodiscard]] bool is_exposed(const url&) const override { return false; }
+    std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url&, const limits& bounds) override {
+        auto by = by_.lock();
+        by->listen(executor, bounds);
+        return std::make_unique<pool_acceptor>(std::move(by));
+    }
+    std::function<void()> dial(const asio::any_io_executor&, const url& where, const limits& bounds,
+                               dial_callback done) override {
+        return by_.lock()->dial(where.host, bounds, std::move(done));
+    }
+
+  private:
+    std::weak_ptr<federated_pools> by_;
+};
+
+} // namespace
+
+federated_pools::federated_pools(federation_options options) : options_(std::move(options)) {
+    if (!bridging::is_pool_name(options_.pool)) {
+        throw error(errc::invalid_name, "'" + options_.pool +
+                                            "' is not a pool's name: 1 to 32 letters, digits, '_', '-'; not self, any, "
+                                            "all");
+    }
+    if (options_.servers.empty()) {
+        throw error(errc::invalid_option, "federation needs the URL of a NATS server");
+    }
+    for (const auto& server : options_.servers) {
+        if (!server.starts_with("nats://") && !server.starts_with("tls://")) {
+            throw error(errc::invalid_option,
+                        "'" + server + "' is not the URL of a NATS server, as in nats://host:4222");
+        }
+    }
+    if (options_.tls_certificate.empty() != options_.tls_key.empty()) {
+        throw error(errc::invalid_option, "a certificate for NATS needs its key, and a key its certificate");
+    }
+}
+
+federated_pools::~federated_pools() = default;
+
+std::unique_ptr<link_transport> federated_pools::make_transport() {
+    return std::make_unique<pool_transport>(weak_from_this());
+}
+
+// -- the node ------------------------------------------------------------------------------------------------------
+
+void federated_pools::start(core::local_node& host) {
+    if (host.node().security) {
+        throw error(errc::invalid_option, "federation is refused with security: what crosses NATS is not sealed");
+    }
+    host_ = host.weak_from_this();
+    host.listeners().listen("pool://" + options_.pool, true);
+}
+
+void federated_pools::listen(const asio::any_io_executor& executor, const limits& bounds) {
+    executor_ = executor;
+    const auto host = host_.lock();
+    bridge_.emplace(
+        bridging::bridge::settings{.pool = options_.pool, .node = host->node().name, .max_line = bounds.line},
+        static_cast<bridging::bridge_output&>(*this));
+}
+
+void federated_pools::accept(std::function<void(link_ptr)> on_link) {
+    on_link_ = std::move(on_link);
+    work_.emplace(executor_);
+    timer_.emplace(executor_);
+    connection_ = std::make_unique<nats_connection>(server_options{.servers = options_.servers,
+                                                                   .name = "cles " + host_.lock()->node().name,
+                                                                   .credentials = options_.credentials,
+                                                                   .token = options_.token,
+                                                                   .tls_authority = options_.tls_authority,
+                                                                   .tls_certificate = options_.tls_certificate,
+                                                                   .tls_key = options_.tls_key},
+                                                    [executor = executor_, weak = weak_from_this()] {
+                                                        asio::post(executor, [weak] {
+                                                            if (const auto self = weak.lock()) {
+                                                                self->on_wake();
+                                                            }
+                                                        });
+                                                    });
+}
+
+std::string federated_pools::address_of(std::string_view target) const {
+    const auto pool = bridge_ ? bridge_->pool_of(target, now()) : std::string{};
+    return pool.empty() ? pool : "pool://" + pool;
+}
+
+std::vector<core::other_pools::known_pool> federated_pools::list() const {
+    std::vector<known_pool> all;
+    if (bridge_) {
+        for (const auto& [name, known] : bridge_->pools().pools()) {
+            if (name != options_.pool) {
+                all.push_back({name, bridge_->is_live(name)});
+            }
+        }
+    }
+    return all;
+}
+
+void federated_pools::leave() {
+    if (!std::exchange(leaving_, true) && connection_) {
+        bridge_->leave();
+        connection_->flush();
+    }
+    stop_if_finished();
+}
+
+// Nothing is posted to the executor after that.
+void federated_pools::stop_if_finished() {
+    if (leaving_ && links_.empty() && !std::exchange(stopped_, true)) {
+        if (connection_) {
+            connection_->stop();
+        }
+        if (timer_) {
+            timer_->cancel();
+        }
+        dials_.clear();
+        on_link_ = nullptr;
+        work_.reset();
+    }
+}
+
+std::function<void()> federated_pools::dial(const std::string& pool, const limits& bounds, dial_callback done) {
+    const auto number = ++last_dial_;
+    dials_.push_back({number, pool, std::move(done), now() + std::min(bounds.connect, pool_appears_within)});
+    run_later();
+    return [weak = weak_from_this(), number] {
+        if (const auto self = weak.lock()) {
+            self->dials_.remove_if([number](const waiting_dial& d) { return d.number == number; });
+        }
+    };
+}
+
+void federated_pools::serve_dials() {
+    std::list<waiting_dial> served;
+    const auto at = now();
+    for (auto next = dials_.begin(); next != dials_.end();) {
+        const auto here = next++;
+        if (bridge_->is_live(here->pool) || here->until <= at) {
+            served.splice(served.end(), dials_, here);
+        }
+    }
+    for (const auto& each : served) {
+        if (bridge_->is_live(each.pool) && !stopped_) {
+            each.done({}, make_link({bridge_link::role::to_pool, each.pool, ++last_link_}));
+        } else {
+            each.done(no_bridge(), nullptr);
+        }
+    }
+}
+
+std::shared_ptr<pool_link> federated_pools::make_link(bridge_link which) {
+    auto made =
+        std::make_shared<pool_link>(std::shared_ptr<pool_link_owner>{shared_from_this(), this}, which, options_.pool);
+    links_.insert_or_assign(std::move(which), made);
+    return made;
+}
+
+// -- the thread and the timer --------------------------------------------------------------------------------------
+
+void federated_pools::on_wake() {
+    if (stopped_) {
+        return;
+    }
+    for (auto& each : connection_->take()) {
+        events_.push_back(std::move(each));
+    }
+    run();
+}
+
+void federated_pools::run_later() {
+    if (!stopped_ && !std::exchange(run_posted_, true)) {
+        asio::post(executor_, [weak = weak_from_this()] {
+            if (const auto self = weak.lock()) {
+                self->run_posted_ = false;
+                self->run();
+            }
+        });
+    }
+}
+
+void federated_pools::run() {
+    if (stopped_ || running_) {
+        return;
+    }
+    const auto keep = shared_from_this();
+    running_ = true;
+    try {
+        run_batches();
+    } catch (...) { // of a handler, for the thread that runs the executor; the other lines are not affected
+        running_ = false;
+        run_later();
+        throw;
+    }
+    running_ = false;
+    if (stopped_) {
+        return;
+    }
+    connection_->flush();
+    if (!events_.empty() || !ready_.empty()) {
+        run_later();
+    }
+    set_timer();
+}
+
+void federated_pools::run_batches() {
+    for (int batch = 0; batch < batches_per_turn && !stopped_ && (batch == 0 || !events_.empty() || !ready_.empty());
+         ++batch) {
+        for (auto left = events_per_batch; left != 0 && !events_.empty() && !stopped_; --left) {
+            const auto next = std::move(events_.front());
+            events_.pop_front();
+            on_event(next);
+        }
+        serve_dials();
+        hand_over_all();
+        if (!stopped_) {
+            bridge_->on_batch();
+        }
+    }
+    const bool is_slow = unsent() > pool_link::capacity;
+    if (was_slow_ && !is_slow) {
+        for (const auto& [which, link] : std::map{links_}) {
+            link->on_writable();
+        }
+    }
+    was_slow_ = is_slow;
+}
+
+void federated_pools::hand_over_all() {
+    for (auto left = ready_.size(); left != 0 && !ready_.empty(); --left) {
+        const auto link = std::move(ready_.front());
+        ready_.pop_front();
+        try {
+            link->hand_over();
+        } catch (...) {
+            schedule(link);
+            throw;
+        }
+    }
+}
+
+void federated_pools::set_timer() {
+    auto due = bridge_->due();
+    for (const auto& each : dials_) {
+        due = std::min(due, each.until);
+    }
+    if (was_slow_) { // the thread does not say when it has sent everything
+        due = std::min(due, now() + std::chrono::milliseconds{10});
+    }
+    if (due != time_point::max() && due < timer_due_) {
+        timer_due_ = due;
+        timer_->expires_after(std::max(due - now(), time_point::duration{0}));
+        timer_->async_wait([weak = weak_from_this()](boost::system::error_code code) {
+            if (const auto self = weak.lock()) {
+                self->on_timer(code);
+            }
+        });
+    }
+}
+
+void federated_pools::on_timer(boost::system::error_code code) {
+    if (code || stopped_) {
+        return;
+    }
+    timer_due_ = time_point::max();
+    if (bridge_->due() <= now()) {
+        bridge_->on_time(now());
+    }
+    run();
+}
+
+void federated_pools::on_event(const event& e) {
+    const auto log_once = [this, &e](const std::string& text) {
+        if (std::exchange(last_problem_, e.text) != e.text) {
+            log(log_level::warning, text);
+        }
+    };
+    switch (e.what) {
+    case event::kind::connected: {
+        log(log_level::info, "connected to NATS, as a bridge of the pool '" + options_.pool + "'");
+        last_problem_.clear();
+        std::random_device random;
+        bridge_->on_connected((std::uint64_t{random()} << 32U) | random(), e.max_message, now());
+        break;
+    }
+    case event::kind::disconnected:
+        log_once("the connection to NATS was lost: " + e.text);
+        bridge_->on_disconnected(e.text);
+        break;
+    case event::kind::refused: log_once("cannot connect to NATS: " + e.text + " (trying again)"); break;
+    case event::kind::problem: log_once("NATS: " + e.text); break;
+    case event::kind::message: bridge_->on_message(e.subject, e.reply, e.text, now()); break;
+    }
+}
+
+// -- for the bridge ------------------------------------------------------------------------------------------------
+
+bool federated_pools::publish(std::string subject, std::string reply, std::string message) {
+    return connection_ && connection_->publish(std::move(subject), std::move(reply), std::move(message));
+}
+
+void federated_pools::subscribe(std::string subject, bool shared) {
+    const bool is_feed = bridging::parse_subject(subject).kind == bridging::subject_kind::feed;
+    connection_->subscribe(std::move(subject), shared ? std::string{bridging::queue_group} : std::string{}, is_feed);
+    if (!running_) {
+        connection_->flush();
+    }
+}
+
+void federated_pools::unsubscribe(const std::string& subject) {
+    connection_->unsubscribe(subject);
+    if (!running_) {
+        connection_->flush();
+    }
+}
+
+void federated_pools::deliver(const bridge_link& on, std::string line) {
+    auto found = links_.find(on);
+    if (found == links_.end()) {
+        if (on.what == bridge_link::role::to_pool || !on_link_) {
+            return;
+        }
+        const auto made = make_link(on);
+        on_link_(made);
+        found = links_.find(on);
+        if (found == links_.end()) { // refused
+            return;
+        }
+    }
+    found->second->deliver(std::move(line));
+}
+
+template <class Condition>
+void federated_pools::lose_if(Condition concerns, std::string_view why) {
+    for (auto next = links_.begin(); next != links_.end();) {
+        const auto here = next++;
+        if (concerns(here->first)) {
+            const auto link = here->second;
+            links_.erase(here); // another one may be opened before the node knows
+            link->lose(why);
+        }
+    }
+}
+
+void federated_pools::lose_pool(std::string_view pool, std::string_view why) {
+    lose_if([pool](const bridge_link& l) { return l.what != bridge_link::role::publications && l.pool == pool; }, why);
+}
+
+void federated_pools::lose_all(std::string_view why) {
+    lose_if([](const bridge_link&) { return true; }, why);
+}
+
+void federated_pools::lose_bindings(std::string_view pool, std::string_view why) {
+    for (const auto& [which, link] : links_) {
+        if (which.what == bridge_link::role::to_pool && which.pool == pool) {
+            link->lose_bindings(why);
+        }
+    }
+}
+
+void federated_pools::on_pools_changed() {
+    if (const auto host = host_.lock()) {
+        host->peer_channels().on_links_changed();
+    }
+    if (!dials_.empty()) {
+        run_later();
+    }
+}
+
+std::vector<std::string> federated_pools::home_names() const {
+    std::vector<std::string> names;
+    if (const auto host = host_.lock()) {
+        names.push_back(host->node().name);
+        for (auto& each : host->node().list_peers(now())) {
+            names.push_back(std::move(each.node));
+        }
+    }
+    return names;
+}
+
+void federated_pools::log(log_level level, const std::string& text) {
+    if (const auto host = host_.lock()) {
+        host->post_log(level, text);
+    }
+}
+
+// -- for the links -------------------------------------------------------------------------------------------------
+
+void federated_pools::on_line(const bridge_link& from, std::string_view line) { bridge_->on_line(from, line, now()); }
+
+void federated_pools::schedule(std::shared_ptr<pool_link> which) {
+    ready_.push_back(std::move(which));
+    if (!running_) {
+        run_later();
+    }
+}
+
+void federated_pools::on_flushed() {
+    if (!running_ && connection_) {
+        connection_->flush();
+        if (!was_slow_ && unsent() > pool_link::capacity) {
+            was_slow_ = true;
+            set_timer();
+        }
+    }
+}
+
+void federated_pools::on_closed(pool_link& which) {
+    const auto found = links_.find(which.which());
+    if (found != links_.end() && found->second.get() == &which) {
+        const auto keep = found->second;
+        links_.erase(found);
+        bridge_->on_closed(which.which());
+        if (!running_ && connection_) {
+            connection_->flush();
+        }
+    }
+    stop_if_finished();
+}
+
+std::size_t federated_pools::unsent() const { return connection_ ? connection_->unsent() : 0; }
+
+void federated_pools::write_metrics(json_writer& w) const {
+    w.begin_object();
+    w.key("pool");
+    w.value(std::string_view{options_.pool});
+    w.key("connected");
+    w.value(bridge_ && bridge_->is_connected());
+    if (!last_problem_.empty()) {
+        w.key("problem");
+        w.value(std::string_view{last_problem_});
+    }
+    if (bridge_) {
+        w.key("pools");
+        w.begin_array();
+        for (const auto& [name, p] : bridge_->pools().pools()) {
+            if (name != options_.pool) {
+                w.begin_object();
+                w.key("pool");
+                w.value(std::string_view{name});
+                w.key("state");
+                w.value(std::string_view{p.bridges.empty() ? "lost" : "live"});
+                w.key("bridges");
+                w.value(std::uint64_t{p.bridges.size()});
+                w.key("nodes");
+                w.value(std::uint64_t{p.names.nodes.size()});
+                w.end_object();
+            }
+        }
+        w.end_array();
+        if (const auto took = bridge_->is_connected() ? bridge_->round_trip() : std::nullopt) {
+            w.key("round_trip_us");
+            w.value(static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(*took).count()));
+        }
+        const auto& f = bridge_->counted();
+        for (const auto& [key, value] :
+             {std::pair{"bridges", std::uint64_t{bridge_->pools().bridge_count()}},
+              std::pair{"connections", f.connections}, std::pair{"bridges_lost", f.bridges_lost},
+              std::pair{"requests_sent", f.requests_sent}, std::pair{"requests_taken", f.requests_taken},
+              std::pair{"updates_sent", f.updates_sent}, std::pair{"updates_received", f.updates_received},
+              std::pair{"messages_refused", f.messages_refused},
+              std::pair{"messages_dropped", connection_ ? connection_->dropped() : 0},
+              std::pair{"unsent", std::uint64_t{unsent()}}}) {
+            w.key(key);
+            w.value(value);
+        }
+    }
+    w.end_object();
+}
+
+} // namespace cles::nats

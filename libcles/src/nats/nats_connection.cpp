@@ -1,0 +1,513 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "nats/nats_connection.hpp"
+
+#include <boost/system/error_code.hpp>
+#include <boost/system/system_error.hpp>
+
+#include <nats/nats.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <fstream>
+#include <utility>
+
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+namespace cles::nats {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr std::int64_t connect_timeout = 1'000; // milliseconds, of one server
+constexpr std::int64_t ping_interval = 2'000;   // milliseconds
+constexpr int max_pings_out = 2;
+constexpr milliseconds first_pause{250};
+constexpr milliseconds longest_pause{1'000};
+constexpr milliseconds flush_at_end{200};
+constexpr int most_buffered = 1 << 20; // bytes that the library holds; more wait here
+
+// What the library may call after its connection has been destroyed here.
+struct registry {
+    std::mutex mutex;
+    std::map<std::uintptr_t, nats_connection*> entries;
+    std::uintptr_t last = 0;
+};
+
+registry& known() {
+    static auto* const instance = new registry; // the library's threads may outlive static objects
+    return *instance;
+}
+
+std::uintptr_t enter(nats_connection* which) {
+    auto& all = known();
+    const std::lock_guard lock{all.mutex};
+    all.entries.emplace(++all.last, which);
+    return all.last;
+}
+
+void leave(std::uintptr_t number) {
+    auto& all = known();
+    const std::lock_guard lock{all.mutex};
+    all.entries.erase(number);
+}
+
+template <class F>
+void with(void* number, F f) {
+    auto& all = known();
+    const std::lock_guard lock{all.mutex};
+    if (const auto found = all.entries.find(reinterpret_cast<std::uintptr_t>(number)); found != all.entries.end()) {
+        f(*found->second);
+    }
+}
+
+std::string last_error(natsStatus code) {
+    const char* const words = nats_GetLastError(nullptr);
+    std::string text = words != nullptr && *words != '\0' ? words : natsStatus_GetText(code);
+    return text.empty() ? std::string{natsStatus_GetText(code)} : text;
+}
+
+// The library does not pass on what a server says that accepts no more connections.
+std::string refusal(std::string said) {
+    if (said.find("Expected 'PONG', got ''") != std::string::npos) {
+        return "the server ended the connection at once: it may have its maximum of connections (" + said + ")";
+    }
+    return said;
+}
+
+std::string to_text(const char* text) { return text == nullptr ? std::string{} : std::string{text}; }
+
+event message_of(natsMsg* from) {
+    event made{.what = event::kind::message,
+               .subject = to_text(natsMsg_GetSubject(from)),
+               .reply = to_text(natsMsg_GetReply(from)),
+               .text = std::string(natsMsg_GetData(from) == nullptr ? "" : natsMsg_GetData(from),
+                                   static_cast<std::size_t>(natsMsg_GetDataLength(from)))};
+    natsMsg_Destroy(from);
+    return made;
+}
+
+int make_descriptor() {
+    const int made = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
+    if (made < 0) {
+        throw boost::system::system_error(errno, boost::system::system_category(), "eventfd");
+    }
+    return made;
+}
+
+} // namespace
+
+/// What the library calls: as an event loop, and with messages.
+struct nats_connection::callbacks {
+    static natsStatus attach(void** data, void* loop, natsConnection*, natsSock socket) {
+        *data = loop;
+        with(loop, [socket](nats_connection& c) { c.socket_ = socket; });
+        return NATS_OK;
+    }
+    static natsStatus read(void* loop, bool add) {
+        if (!add) { // the connection is being closed
+            with(loop, [](nats_connection& c) {
+                c.closed_ = true;
+                c.signal();
+            });
+        }
+        return NATS_OK;
+    }
+    static natsStatus write(void* loop, bool add) {
+        with(loop, [add](nats_connection& c) {
+            c.wants_write_ = add;
+            if (add && std::this_thread::get_id() != c.own_thread_.load()) {
+                c.signal();
+            }
+        });
+        return NATS_OK;
+    }
+    static natsStatus detach(void* loop) {
+        with(loop, [](nats_connection& c) {
+            c.closed_ = true;
+            c.socket_ = -1;
+            c.signal();
+        });
+        return NATS_OK;
+    }
+    static void error(natsConnection* connection, natsSubscription*, natsStatus code, void* loop) {
+        const char* words = nullptr;
+        natsConnection_GetLastError(connection, &words);
+        std::string text = words != nullptr && *words != '\0' ? words : natsStatus_GetText(code);
+        if (code == NATS_SLOW_CONSUMER) {
+            text = "messages were dropped, because this node is too slow for them";
+        }
+        with(loop, [&text](nats_connection& c) { c.put({.what = event::kind::problem, .text = std::move(text)}); });
+    }
+    static void bulk(natsConnection*, natsSubscription*, natsMsg* message, void* loop) {
+        auto made = message_of(message);
+        with(loop, [&made](nats_connection& c) { c.put_bulk(std::move(made)); });
+    }
+};
+
+nats_connection::nats_connection(server_options options, std::function<void()> wake)
+    : options_(std::move(options)), number_(enter(this)), wake_descriptor_(make_descriptor()), wake_(std::move(wake)),
+      thread_([this] { run(); }) {}
+
+nats_connection::~nats_connection() {
+    stop();
+    thread_.join();
+    leave(number_);
+    ::close(wake_descriptor_);
+}
+
+// -- on the executor -----------------------------------------------------------------------------------------------
+
+void nats_connection::stop() noexcept {
+    {
+        const std::lock_guard lock{mutex_};
+        wake_ = nullptr;
+    }
+    stopped_ = true;
+    signal();
+}
+
+void nats_connection::enqueue(command c) {
+    const auto size = c.size();
+    const std::lock_guard lock{mutex_};
+    commands_.push_back(std::move(c));
+    queued_ += size;
+}
+
+bool nats_connection::publish(std::string subject, std::string reply, std::string text) {
+    if (unsent() > max_unsent) {
+        return false;
+    }
+    enqueue({.what = command::kind::publish,
+             .subject = std::move(subject),
+             .reply = std::move(reply),
+             .text = std::move(text)});
+    return true;
+}
+
+void nats_connection::subscribe(std::string subject, std::string group, bool bulk) {
+    enqueue({.what = bulk ? command::kind::subscribe_bulk : command::kind::subscribe,
+             .subject = std::move(subject),
+             .reply = std::move(group)});
+}
+
+void nats_connection::unsubscribe(std::string subject) {
+    enqueue({.what = command::kind::unsubscribe, .subject = std::move(subject)});
+}
+
+void nats_connection::flush() {
+    if (queued_ != 0) {
+        signal();
+    }
+}
+
+std::vector<event> nats_connection::take() {
+    const std::lock_guard lock{mutex_};
+    waking_ = false;
+    untaken_ = 0;
+    if (std::exchange(is_full_, false)) {
+        signal();
+    }
+    return std::exchange(events_, {});
+}
+
+void nats_connection::signal() const noexcept {
+    const std::uint64_t one = 1;
+    static_cast<void>(::write(wake_descriptor_, &one, sizeof one));
+}
+
+// -- on any thread -------------------------------------------------------------------------------------------------
+
+void nats_connection::put_locked(event e) {
+    untaken_ += e.text.size() + e.subject.size() + e.reply.size() + sizeof(event);
+    events_.push_back(std::move(e));
+    if (wake_ && !std::exchange(waking_, true)) {
+        wake_();
+    }
+}
+
+void nats_connection::put(event e) {
+    const std::lock_guard lock{mutex_};
+    put_locked(std::move(e));
+}
+
+void nats_connection::put_bulk(event e) {
+    const std::lock_guard lock{mutex_};
+    if (untaken_ > max_untaken) {
+        ++dropped_;
+    } else {
+        put_locked(std::move(e));
+    }
+}
+
+// -- on its thread -------------------------------------------------------------------------------------------------
+
+void nats_connection::run() {
+    own_thread_ = std::this_thread::get_id();
+    auto next_pause = first_pause;
+    while (!stopped_) {
+        if (auto why = connect(); !why.empty()) {
+            put({.what = event::kind::refused, .text = std::move(why)});
+        } else {
+            next_pause = first_pause;
+            why = serve();
+            disconnect();
+            if (!stopped_) {
+                put({.what = event::kind::disconnected, .text = std::move(why)});
+            }
+        }
+        pause(next_pause);
+        next_pause = std::min(next_pause * 2, longest_pause);
+    }
+    nats_ReleaseThreadMemory();
+}
+
+void nats_connection::pause(milliseconds time) {
+    const auto until = std::chrono::steady_clock::now() + time;
+    while (!stopped_) {
+        const auto left = std::chrono::ceil<milliseconds>(until - std::chrono::steady_clock::now());
+        if (left.count() <= 0) {
+            return;
+        }
+        pollfd woken{.fd = wake_descriptor_, .events = POLLIN, .revents = 0};
+        if (::poll(&woken, 1, static_cast<int>(left.count())) > 0) {
+            std::uint64_t ignored = 0;
+            static_cast<void>(::read(wake_descriptor_, &ignored, sizeof ignored));
+        }
+    }
+}
+
+// Returns why it cannot be done; empty if it can.
+std::string nats_connection::configure(natsOptions* made) const {
+    std::vector<const char*> servers;
+    bool is_secure = !options_.tls_authority.empty() || !options_.tls_certificate.empty();
+    for (const auto& server : options_.servers) {
+        servers.push_back(server.c_str());
+        is_secure = is_secure || server.starts_with("tls://");
+    }
+    auto* const self = reinterpret_cast<void*>(number_); // NOLINT(performance-no-int-to-ptr): found in the registry
+    std::string token;
+    if (!options_.token.empty()) {
+        std::ifstream file{options_.token};
+        if (!std::getline(file, token) || token.empty()) {
+            return "cannot read a token from " + options_.token;
+        }
+    }
+    const auto check = [](natsStatus code, const std::string& what) {
+        return code == NATS_OK ? std::string{} : what + ": " + last_error(code);
+    };
+    std::string why;
+    const auto step = [&](natsStatus code, const std::string& what) {
+        if (why.empty()) {
+            why = check(code, what);
+        }
+    };
+    step(natsOptions_SetServers(made, servers.data(), static_cast<int>(servers.size())), "the URL of a server");
+    step(natsOptions_SetName(made, options_.name.c_str()), "the name");
+    step(natsOptions_SetTimeout(made, connect_timeout), "the time limit");
+    // Otherwise a thread of the library asks for it a millisecond later. `apply_commands` writes once for many.
+    step(natsOptions_SetSendAsap(made, true), "the buffer");
+    step(natsOptions_SetAllowReconnect(made, false), "the connection"); // it would send again what was not sent
+    step(natsOptions_SetPingInterval(made, ping_interval), "the interval");
+    step(natsOptions_SetMaxPingsOut(made, max_pings_out), "the interval");
+    step(natsOptions_UseGlobalMessageDelivery(made, true), "the threads");
+    step(natsOptions_DisableNoResponders(made, true), "the replies");
+    step(natsOptions_SetErrorHandler(made, &callbacks::error, self), "the handler");
+    step(natsOptions_SetEventLoop(made, self, &callbacks::attach, &callbacks::read, &callbacks::write,
+                                  &callbacks::detach),
+         "the event loop");
+    if (!token.empty()) {
+        step(natsOptions_SetToken(made, token.c_str()), "the token");
+    }
+    if (!options_.credentials.empty()) {
+        step(natsOptions_SetUserCredentialsFromFiles(made, options_.credentials.c_str(), nullptr),
+             options_.credentials);
+    }
+    if (is_secure) {
+        step(natsOptions_SetSecure(made, true), "TLS");
+    }
+    if (!options_.tls_authority.empty()) {
+        step(natsOptions_LoadCATrustedCertificates(made, options_.tls_authority.c_str()), options_.tls_authority);
+    }
+    if (!options_.tls_certificate.empty()) {
+        step(natsOptions_LoadCertificatesChain(made, options_.tls_certificate.c_str(), options_.tls_key.c_str()),
+             options_.tls_certificate);
+    }
+    return why;
+}
+
+std::string nats_connection::connect() {
+    natsOptions* made = nullptr;
+    if (const auto code = natsOptions_Create(&made); code != NATS_OK) {
+        return last_error(code);
+    }
+    auto why = configure(made);
+    if (why.empty()) {
+        closed_ = false;
+        wants_write_ = false;
+        if (const auto code = natsConnection_Connect(&connection_, made); code != NATS_OK) {
+            why = refusal(last_error(code));
+            connection_ = nullptr;
+        }
+    }
+    natsOptions_Destroy(made);
+    if (!why.empty()) {
+        return why;
+    }
+    event connected{.what = event::kind::connected,
+                    .max_message = static_cast<std::size_t>(natsConnection_GetMaxPayload(connection_))};
+    const std::lock_guard lock{mutex_};
+    commands_.clear(); // from before
+    queued_ = 0;
+    put_locked(std::move(connected));
+    return {};
+}
+
+// Returns why it has ended.
+std::string nats_connection::serve() {
+    while (!stopped_ && !closed_ && !natsConnection_IsClosed(connection_)) {
+        const bool all_applied = apply_commands();
+        const bool wants_read = wants_more();
+        std::array<pollfd, 2> waited{pollfd{.fd = wake_descriptor_, .events = POLLIN, .revents = 0},
+                                     pollfd{.fd = socket_,
+                                            .events = static_cast<short>((wants_read ? POLLIN : 0) |
+                                                                         (wants_write_ || !all_applied ? POLLOUT : 0)),
+                                            .revents = 0}};
+        if (::poll(waited.data(), waited.size(), -1) < 0 && errno != EINTR) {
+            return "poll failed";
+        }
+        if ((waited[0].revents & POLLIN) != 0) {
+            std::uint64_t ignored = 0;
+            static_cast<void>(::read(wake_descriptor_, &ignored, sizeof ignored));
+        }
+        if ((waited[1].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
+            natsConnection_ProcessReadEvent(connection_);
+            collect();
+        }
+        if ((waited[1].revents & POLLOUT) != 0) {
+            natsConnection_ProcessWriteEvent(connection_);
+        }
+    }
+    if (stopped_) {
+        send_rest();
+        return {};
+    }
+    const char* words = nullptr;
+    natsConnection_GetLastError(connection_, &words);
+    auto why = to_text(words);
+    return why.empty() ? std::string{"the server closed it, or does not answer"} : why;
+}
+
+bool nats_connection::wants_more() {
+    const std::lock_guard lock{mutex_};
+    is_full_ = untaken_ > max_untaken;
+    return !is_full_;
+}
+
+// Returns false if some wait until the socket takes more.
+bool nats_connection::apply_commands() {
+    for (;;) {
+        const auto buffered = natsConnection_Buffered(connection_);
+        buffered_ = static_cast<std::size_t>(std::max(buffered, 0));
+        if (buffered > most_buffered) {
+            return false;
+        }
+        std::vector<command> taken;
+        {
+            const std::lock_guard lock{mutex_};
+            taken.swap(commands_);
+        }
+        if (taken.empty()) {
+            return true;
+        }
+        std::size_t bytes = 0;
+        for (const auto& c : taken) {
+            apply(c);
+            bytes += c.size();
+        }
+        queued_ -= bytes;
+        if (wants_write_) {
+            natsConnection_ProcessWriteEvent(connection_);
+        }
+    }
+}
+
+void nats_connection::apply(const command& c) {
+    auto* const self = reinterpret_cast<void*>(number_); // NOLINT(performance-no-int-to-ptr): found in the registry
+    const auto* const group = c.reply.empty() ? nullptr : c.reply.c_str();
+    natsSubscription* made = nullptr;
+    natsStatus code = NATS_OK;
+    switch (c.what) {
+    case command::kind::publish:
+        code = group == nullptr ? natsConnection_Publish(connection_, c.subject.c_str(), c.text.data(),
+                                                         static_cast<int>(c.text.size()))
+                                : natsConnection_PublishRequest(connection_, c.subject.c_str(), group, c.text.data(),
+                                                                static_cast<int>(c.text.size()));
+        break;
+    case command::kind::subscribe:
+        code = group == nullptr ? natsConnection_SubscribeSync(&made, connection_, c.subject.c_str())
+                                : natsConnection_QueueSubscribeSync(&made, connection_, c.subject.c_str(), group);
+        if (code == NATS_OK) {
+            natsSubscription_SetPendingLimits(made, -1, -1); // they are taken at once
+            polled_.push_back(made);
+        }
+        break;
+    case command::kind::subscribe_bulk:
+        code = natsConnection_Subscribe(&made, connection_, c.subject.c_str(), &callbacks::bulk, self);
+        break;
+    case command::kind::unsubscribe:
+        if (const auto found = subscriptions_.find(c.subject); found != subscriptions_.end()) {
+            std::erase(polled_, found->second);
+            natsSubscription_Destroy(found->second);
+            subscriptions_.erase(found);
+        }
+        break;
+    }
+    if (made != nullptr && code == NATS_OK) {
+        auto& kept = subscriptions_[c.subject];
+        natsSubscription_Destroy(std::exchange(kept, made));
+    }
+    if (code != NATS_OK && code != NATS_CONNECTION_CLOSED) {
+        put({.what = event::kind::problem, .text = c.subject + ": " + last_error(code)});
+    }
+}
+
+void nats_connection::collect() {
+    for (auto* const each : polled_) {
+        int left = 0; // to ask for one more would have the library describe an error
+        int bytes = 0;
+        natsMsg* message = nullptr;
+        natsSubscription_GetPending(each, &left, &bytes);
+        for (; left > 0 && natsSubscription_NextMsg(&message, each, 0) == NATS_OK; --left) {
+            put(message_of(message));
+        }
+    }
+}
+
+void nats_connection::send_rest() {
+    const auto until = std::chrono::steady_clock::now() + flush_at_end;
+    apply_commands();
+    while (natsConnection_Buffered(connection_) > 0 && !closed_ && std::chrono::steady_clock::now() < until) {
+        pollfd waited{.fd = socket_, .events = POLLOUT, .revents = 0};
+        constexpr int step = 20; // milliseconds
+        if (::poll(&waited, 1, step) > 0) {
+            natsConnection_ProcessWriteEvent(connection_);
+        }
+    }
+}
+
+void nats_connection::disconnect() {
+    for (const auto& [subject, subscription] : std::exchange(subscriptions_, {})) {
+        natsSubscription_Destroy(subscription);
+    }
+    polled_.clear();
+    natsConnection_Destroy(std::exchange(connection_, nullptr));
+    const std::lock_guard lock{mutex_};
+    commands_.clear();
+    queued_ = 0;
+    buffered_ = 0;
+}
+
+} // namespace cles::nats

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <vector>
+
+struct __natsConnection;   // NOLINT(bugprone-reserved-identifier): as libnats declares it
+struct __natsOptions;      // NOLINT(bugprone-reserved-identifier)
+struct __natsSubscription; // NOLINT(bugprone-reserved-identifier)
+
+namespace cles::nats {
+
+/// Where NATS is, and what is shown to it.
+struct server_options {
+    std::vector<std::string> servers;
+    std::string name; ///< of the client, for the server's monitoring
+    std::string credentials;
+    std::string token;
+    std::string tls_authority;
+    std::string tls_certificate;
+    std::string tls_key;
+};
+
+/// What has happened, in order.
+struct event {
+    enum class kind : std::uint8_t {
+        connected,    ///< `max_message` is set
+        disconnected, ///< `text`: why
+        refused,      ///< an attempt to connect failed; `text`: why
+        problem,      ///< `text`: what the server does not permit
+        message       ///< `subject`, `reply` and `text` are set
+    };
+    kind what = kind::message;
+    std::string subject{};
+    std::string reply{};
+    std::string text{};
+    std::size_t max_message = 0;
+};
+
+/// A connection to NATS on a thread of its own, which connects again whenever the connection is lost, after growing
+/// pauses. Each connection begins without subscriptions, and what was not sent on the last one is dropped: nothing is
+/// sent twice.
+///
+/// Its functions are called on one thread, the executor's, and do not block; the destructor waits for the thread, at
+/// most for an attempt to connect.
+class nats_connection {
+  public:
+    static constexpr std::size_t max_unsent = 4U << 20U;
+    static constexpr std::size_t max_untaken = 8U << 20U;
+
+    /// \param wake called on another thread when there are events, until `stop`
+    nats_connection(server_options options, std::function<void()> wake);
+    nats_connection(const nats_connection&) = delete;
+    nats_connection& operator=(const nats_connection&) = delete;
+    ~nats_connection();
+
+    /// Returns false if too much waits to be sent.
+    bool publish(std::string subject, std::string reply, std::string text);
+    /// \param group the queue group; empty: none \param bulk messages that may be dropped if too many wait to be taken
+    void subscribe(std::string subject, std::string group, bool bulk);
+    void unsubscribe(std::string subject);
+    /// Has the thread send what was published.
+    void flush();
+    /// What has happened since the last call.
+    std::vector<event> take();
+    /// Bytes that the server has not been sent yet.
+    [[nodiscard]] std::size_t unsent() const noexcept { return queued_.load() + buffered_.load(); }
+    /// Messages of subscriptions that were dropped.
+    [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(); }
+    /// Sends what waits, and ends. `wake` is not called any more.
+    void stop() noexcept;
+
+  private:
+    struct command {
+        enum class kind : std::uint8_t { publish, subscribe, subscribe_bulk, unsubscribe };
+        kind what;
+        std::string subject;
+        std::string reply{}; // or the queue group
+        std::string text{};
+
+        [[nodiscard]] std::size_t size() const noexcept { return subject.size() + reply.size() + text.size() + 16; }
+    };
+    struct callbacks;
+    friend struct callbacks;
+
+    void run();
+    std::string connect();
+    std::string configure(__natsOptions* made) const;
+    std::string serve();
+    bool apply_commands();
+    void apply(const command& c);
+    void collect();
+    void put(event e);
+    void put_bulk(event e);
+    void put_locked(event e);
+    void disconnect();
+    void send_rest();
+    void pause(std::chrono::milliseconds time);
+    void signal() const noexcept;
+    void enqueue(command c);
+    [[nodiscard]] bool wants_more();
+
+    const server_options options_;
+    const std::uintptr_t number_; // in the registry of those that the library may call
+    int wake_descriptor_;
+
+    std::mutex mutex_; // guards what follows
+    std::function<void()> wake_;
+    std::vector<command> commands_;
+    std::vector<event> events_;
+    std::size_t untaken_ = 0;
+    bool waking_ = false;
+    bool is_full_ = false;
+
+    std::atomic<std::size_t> queued_{0};
+    std::atomic<std::size_t> buffered_{0};
+    std::atomic<std::uint64_t> dropped_{0};
+    std::atomic<bool> stopped_{false};
+    std::atomic<bool> closed_{false};
+    std::atomic<bool> wants_write_{false};
+    std::atomic<int> socket_{-1};
+    std::atomic<std::thread::id> own_thread_{};
+
+    // Of the thread.
+    __natsConnection* connection_ = nullptr;
+    std::map<std::string, __natsSubscription*, std::less<>> subscriptions_;
+    std::vector<__natsSubscription*> polled_;
+
+    std::thread thread_; // last: it uses all of the above
+};
+
+} // namespace cles::nats

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "nats/pool_link.hpp"
+
+#include <boost/asio/error.hpp>
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::nats {
+namespace {
+
+constexpr int lines_per_turn = 1024;
+
+std::string address_of(const bridging::bridge_link& which, const std::string& own_pool) {
+    using role = bridging::bridge_link::role;
+    switch (which.what) {
+    case role::publications: return "pool://" + own_pool;
+    case role::from_pool: return "pool://" + (which.pool.empty() ? std::string{"programs"} : which.pool);
+    case role::to_pool: break;
+    }
+    return "pool://" + which.pool;
+}
+
+} // namespace
+
+pool_link::pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link which, std::string own_pool)
+    : by_(std::move(by)), which_(std::move(which)), peer_{.transport = "pool",
+                                                          .address = address_of(which_, own_pool),
+                                                          .name = {},
+                                                          .uid = {},
+                                                          .local = false} {}
+
+std::size_t pool_link::excess() const noexcept {
+    const auto by = by_.lock();
+    const auto waiting = by && !closed_ ? by->unsent() : 0;
+    return waiting > capacity ? waiting - capacity : 0;
+}
+
+std::uint64_t pool_link::sent() const noexcept { return flushed_ - std::min<std::uint64_t>(flushed_, excess()); }
+
+void pool_link::schedule() {
+    if (const auto by = by_.lock(); by && !std::exchange(scheduled_, true)) {
+        by->schedule(shared_from_this());
+    }
+}
+
+void pool_link::start(std::shared_ptr<link_events> owner) {
+    owner_ = std::move(owner);
+    if (!inbox_.empty() || lost_) {
+        schedule();
+    }
+}
+
+void pool_link::flush() {
+    const auto by = by_.lock();
+    if (closed_ || output_.empty()) {
+        return;
+    }
+    const auto text = std::exchange(output_, {});
+    flushed_ += text.size();
+    if (!by || lost_) {
+        return;
+    }
+    for (std::string_view left = text; !left.empty() && !closed_;) {
+        const auto end = std::min(left.find('\n'), left.size());
+        by->on_line(which_, left.substr(0, end));
+        left.remove_prefix(std::min(end + 1, left.size()));
+    }
+    was_full_ = was_full_ || excess() != 0;
+    by->on_flushed();
+}
+
+void pool_link::on_writable() {
+    if (std::exchange(was_full_, false) && owner_) {
+        const auto owner = owner_;
+        owner->on_writable();
+    }
+}
+
+void pool_link::pause(bool stop) {
+    if (std::exchange(paused_, stop) && !stop && !inbox_.empty()) {
+        schedule();
+    }
+}
+
+void pool_link::finish() {
+    if (!closed_ && !std::exchange(finishing_, true)) {
+        flush();
+        inbox_.clear();
+        lost_ = true;
+        schedule();
+    }
+}
+
+void pool_link::close() {
+    if (!std::exchange(closed_, true)) {
+        end();
+    }
+}
+
+void pool_link::end() {
+    const auto keep = shared_from_this();
+    inbox_.clear();
+    owner_.reset();
+    if (const auto by = by_.lock()) {
+        by->on_closed(*this);
+    }
+}
+
+// -- from the bridge -----------------------------------------------------------------------------------------------
+
+void pool_link::deliver(std::string line) {
+    if (!closed_ && !finishing_ && !lost_) {
+        inbox_.push_back(std::move(line));
+        schedule();
+    }
+}
+
+void pool_link::lose_bindings(std::string_view why) {
+    if (!closed_ && !lost_) {
+        bindings_lost_ = std::string{why};
+        schedule();
+    }
+}
+
+void pool_link::lose(std::string_view) {
+    if (!closed_ && !std::exchange(lost_, true)) {
+        schedule();
+    }
+}
+
+void pool_link::hand_over_lines(const std::shared_ptr<link_events>& owner) {
+    for (int turn = lines_per_turn; turn > 0 && !closed_ && !paused_ && !inbox_.empty(); --turn) {
+        const auto line = std::move(inbox_.front());
+        inbox_.pop_front();
+        received_ += line.size() + 1;
+        owner->on_line(line);
+    }
+}
+
+void pool_link::hand_over() {
+    const auto keep = shared_from_this();
+    const auto owner = owner_;
+    scheduled_ = false;
+    if (closed_ || !owner) {
+        return;
+    }
+    const bool had_lines = !inbox_.empty();
+    hand_over_lines(owner);
+    if (had_lines && !closed_) {
+        owner->on_batch();
+    }
+    if (closed_) {
+        return;
+    }
+    if (!inbox_.empty() && !paused_) {
+        schedule();
+        return;
+    }
+    if (const auto why = std::exchange(bindings_lost_, {}); why && !lost_) {
+        owner->on_bindings_lost(*why);
+    }
+    if (lost_ && !closed_) {
+        closed_ = true;
+        end();
+        owner->on_lost(boost::asio::error::connection_reset);
+    }
+}
+
+} // namespace cles::nats

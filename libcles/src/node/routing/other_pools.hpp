@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+class local_node;
+
+/// The other pools that a node reaches (docs/federation.md). An interface, so that programs without federation do not
+/// link its code.
+class other_pools {
+  public:
+    other_pools() = default;
+    other_pools(const other_pools&) = delete;
+    other_pools& operator=(const other_pools&) = delete;
+    virtual ~other_pools() = default;
+
+    /// The node listens now. Called once. \throws cles::error
+    virtual void start(local_node& host) = 0;
+    /// The URL of the pool that has this node, which is not known at home. Empty if none has.
+    [[nodiscard]] virtual std::string address_of(std::string_view target) const = 0;
+
+    struct known_pool {
+        std::string name;
+        bool live = true; ///< requests can be sent there now
+    };
+    /// All other pools that are known, by name.
+    [[nodiscard]] virtual std::vector<known_pool> list() const = 0;
+};
+
+} // namespace cles::core
