@@ -57,7 +57,7 @@ class TwoPools(Cluster):
         self.server.wait()
 
     def config_of(self, name):
-        bridge = f"federation: {{nats: 'nats://127.0.0.1:{self.port}', pool: %s}}"
+        bridge = f"insecure: true\nfederation: {{nats: 'nats://127.0.0.1:{self.port}', pool: %s}}"
         place = {HUB: bridge % "south", GATE: bridge % "north",
                  INNER: f"pool: north\nseeds: ['{self.urls.get(GATE, '')}']"}[name]
         return CONFIG.format(name=name, place=place, plugins="libcles-system.so" if name == HUB else

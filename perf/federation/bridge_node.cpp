@@ -73,6 +73,7 @@ void run(char** arguments) {
     boost::asio::io_context io{1};
     cles::service_options options{.name = arguments[3], .listen = {arguments[4]}};
     options.routing = cles::routing();
+    options.insecure = true;
     options.federation = cles::federation({.servers = {arguments[1]}, .pool = arguments[2]});
     const std::string seed = arguments[5];
     options.gossip = seed.empty() ? cles::gossip() : cles::gossip({seed});

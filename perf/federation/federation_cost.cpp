@@ -152,6 +152,7 @@ class bare_requester {
 cles::service_options bridge_options(const std::string& url, const std::string& name, const std::string& pool) {
     cles::service_options options{.name = name};
     options.routing = cles::routing();
+    options.insecure = true;
     options.federation = cles::federation({.servers = {url}, .pool = pool});
     return options;
 }

@@ -81,6 +81,7 @@ class fleet {
                 options.gossip = cles::gossip(seeds);
                 options.pool = pool_name(pool);
                 if (node == 0) {
+                    options.insecure = true;
                     options.federation = cles::federation({.servers = {url}, .pool = pool_name(pool)});
                 }
                 auto made = std::make_unique<cles::service>(io, options);

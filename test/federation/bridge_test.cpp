@@ -262,6 +262,15 @@ BOOST_FIXTURE_TEST_CASE(a_request_that_has_been_in_the_pool_is_refused, two_pool
     BOOST_TEST(answers[0].find(R"({"error":"no_target")") != std::string::npos);
 }
 
+BOOST_FIXTURE_TEST_CASE(a_request_from_another_pool_is_not_sent_on, two_pools) {
+    for (const std::string via : {"south.nats,south.hub,gate", "south.gate,program.nats"}) {
+        const auto id = hub.ask("north", "PUSH car9:echo via=" + via);
+        nats.run_for(10ms);
+        BOOST_TEST(hub.answer(id).find(R"({"error":"no_target")") == 0U);
+    }
+    BOOST_TEST(nats.published("push") == 0U);
+}
+
 BOOST_FIXTURE_TEST_CASE(within_its_own_pool_a_qualified_name_works, two_pools) {
     const auto id = hub.ask("south", "PUSH south.car1:echo via=hub {\"n\":1}");
     nats.run_for(10ms);

@@ -54,10 +54,20 @@ BOOST_AUTO_TEST_CASE(a_message_is_a_line_again) {
     BOOST_TEST(text_of(verb::pull, "car1", "speed", "x:y") == "PULL car1:speed x:y");
 }
 
-BOOST_AUTO_TEST_CASE(the_line_for_the_node_has_its_id) {
-    BOOST_TEST(line_of(parsed("DELEGATE car1:plan id=99 progress=yes deadline=5 {\"a\":1}"), 3) ==
-               "DELEGATE car1:plan id=3 progress=yes deadline=5 {\"a\":1}");
-    BOOST_TEST(line_of(parsed("PULL car1:speed/fast via=south.hub"), 3) == "PULL car1:speed/fast id=3 via=south.hub");
+BOOST_AUTO_TEST_CASE(the_line_for_the_node_has_its_id_and_the_pool) {
+    BOOST_TEST(line_of(parsed("DELEGATE car1:plan id=99 progress=yes deadline=5 {\"a\":1}"), 3, "south") ==
+               "DELEGATE car1:plan id=3 via=south.nats progress=yes deadline=5 {\"a\":1}");
+    BOOST_TEST(line_of(parsed("PULL car1:speed/fast via=south.hub x=1"), 3, "south") ==
+               "PULL car1:speed/fast id=3 via=south.nats,south.hub x=1");
+    BOOST_TEST(line_of(parsed("PULL car1:speed"), 3, {}) == "PULL car1:speed id=3 via=program.nats");
+}
+
+BOOST_AUTO_TEST_CASE(a_request_from_another_pool_is_recognised) {
+    BOOST_TEST(has_crossed("south.nats"));
+    BOOST_TEST(has_crossed("south.nats,south.hub,gate"));
+    BOOST_TEST(has_crossed("south.hub,program.nats"));
+    BOOST_TEST(!has_crossed("hub,nats,natsy,gate.nats1"));
+    BOOST_TEST(!has_crossed(""));
 }
 
 BOOST_AUTO_TEST_CASE(pools_in_via_are_recognised) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/error.hpp>
 #include <cles/federation.hpp>
 #include <cles/service.hpp>
 
@@ -7,9 +8,18 @@
 
 BOOST_AUTO_TEST_SUITE(federated_service)
 
+BOOST_AUTO_TEST_CASE(it_has_to_be_permitted) {
+    boost::asio::io_context io{1};
+    cles::service_options options{.name = "hub"};
+    options.federation = cles::federation({.servers = {"nats://127.0.0.1:1"}, .pool = "south"});
+    BOOST_CHECK_EXCEPTION(cles::service(io, options), cles::error,
+                          [](const cles::error& e) { return e.code() == cles::errc::insecure_listen; });
+}
+
 BOOST_AUTO_TEST_CASE(a_bridge_waits_for_requests_like_a_node_that_listens) {
     boost::asio::io_context io{1};
     cles::service_options options{.name = "hub"};
+    options.insecure = true;
     options.federation = cles::federation({.servers = {"nats://127.0.0.1:1"}, .pool = "south"}); // nobody is there
     cles::service hub{io, options};
     io.poll();

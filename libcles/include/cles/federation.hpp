@@ -36,6 +36,7 @@ struct federation_options {
 /// The bridge of one service, for `service_options::federation`. It starts one thread, which connects to NATS, and
 /// connects again whenever the connection is lost; the thread ends when the service is destroyed. The files are read at
 /// each connection. The service has to route (`cles::routing`) to serve requests of other pools for other nodes.
+/// It needs `service_options::insecure`: whoever may publish to NATS can send requests.
 ///
 /// \throws cles::error with `invalid_option` or `invalid_name`
 std::function<void(asio_port::asio_environment&, core::node_options&)> federation(federation_options options);

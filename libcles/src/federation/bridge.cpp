@@ -462,6 +462,12 @@ void bridge::send_request(const bridge_link& from, std::string_view line, time_p
 void bridge::publish_request(const bridge_link& from, const protocol::request_line& r, time_point now) {
     const auto& pool = from.pool;
     const auto number = sent_.add(from, r.id, now + milliseconds{r.deadline_ms}, now);
+    if (has_crossed(r.via)) { // a node of that name in another pool is not the one that was meant
+        sent_.on_message(number,
+                         failure_text({.code = errc::no_target,
+                                       .message = "a request from another pool is not sent on to '" + pool + "'"}));
+        return;
+    }
     auto message = pool == setup_.pool ? message_within_pool(r) : message_of(r, setup_.pool);
     if (message.size() > max_message_) {
         sent_.on_message(number, failure_text({.code = errc::too_large,
@@ -607,7 +613,7 @@ void bridge::take(const subject& about, std::string_view reply, std::string_view
         return;
     }
     ++figures_.requests_taken;
-    out_.deliver(on, line_of(r, *id));
+    out_.deliver(on, line_of(r, *id, on.pool));
     if (!r.wants_reply) {
         taken_.remove(*id);
     }
@@ -687,9 +693,7 @@ void bridge::take_bind(const protocol::request_line& r, const taken_requests::re
     if (const auto id = published_.bind(noun, {by.by, by.reply}); id != 0) {
         std::string line = "BIND " + noun + " id=" + std::to_string(id) + " deadline=" + std::to_string(r.deadline_ms) +
                            " keep=" + std::to_string(upstream_keep) + " mark=yes hops=" + std::to_string(r.hops);
-        if (!r.via.empty()) {
-            line.append(" via=").append(r.via);
-        }
+        line.append(" via=").append(via_of(r, by.by.pool));
         out_.deliver({bridge_link::role::publications, {}}, std::move(line));
     }
 }

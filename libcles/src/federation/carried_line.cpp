@@ -9,6 +9,9 @@
 namespace cles::bridging {
 namespace {
 
+// Ends the entry of `via` for a pool that the request comes from.
+constexpr std::string_view crossed = ".nats";
+
 // Appends the adverbs, without `id`, and the body. \param home of the names in `via`; nothing: `via` is left out
 void append_rest(std::string& out, const protocol::request_line& r, std::optional<std::string_view> home) {
     protocol::part_reader parts{r.text};
@@ -55,12 +58,31 @@ std::string message_within_pool(const protocol::request_line& request) {
     return made;
 }
 
-std::string line_of(const protocol::request_line& request, std::uint64_t id) {
+std::string line_of(const protocol::request_line& request, std::uint64_t id, std::string_view from) {
     std::string made{to_string(request.verb)};
     made.append(" ").append(request.noun.target).append(":").append(request.noun.path);
-    made.append(" id=").append(std::to_string(id));
-    append_rest(made, request, std::string_view{});
+    made.append(" id=").append(std::to_string(id)).append(" via=").append(via_of(request, from));
+    append_rest(made, request, {});
     return made;
+}
+
+std::string via_of(const protocol::request_line& request, std::string_view from) {
+    auto made = std::string{from.empty() ? "program" : from}.append(crossed);
+    if (!request.via.empty()) {
+        made.append(",").append(request.via);
+    }
+    return made;
+}
+
+bool has_crossed(std::string_view via) noexcept {
+    while (!via.empty()) {
+        const auto comma = via.find(',');
+        if (via.substr(0, comma).ends_with(crossed)) {
+            return true;
+        }
+        via.remove_prefix(comma == std::string_view::npos ? via.size() : comma + 1);
+    }
+    return false;
 }
 
 std::string text_of(verb how, std::string_view node, std::string_view task, std::string_view message) {

@@ -21,9 +21,14 @@ std::string message_of(const protocol::request_line& request, std::string_view h
 /// bridge, or to the bridge itself.
 std::string message_within_pool(const protocol::request_line& request);
 
-/// The line of a request without LF, with that id.
-/// \param text the request, with or without an id of its own
-std::string line_of(const protocol::request_line& request, std::uint64_t id);
+/// The line of a request that has arrived, without LF, with that id, and with `via_of`.
+std::string line_of(const protocol::request_line& request, std::uint64_t id, std::string_view from);
+
+/// `via` of a request that has arrived: begins with an entry for the pool that it is from, so that no bridge of this
+/// pool sends it on to another one. \param from empty: a program that is no bridge
+std::string via_of(const protocol::request_line& request, std::string_view from);
+/// Whether the request has arrived from NATS in this pool, at whatever bridge.
+bool has_crossed(std::string_view via) noexcept;
 
 /// The text of a request or update that has arrived: "PULL car1:speed/fast deadline=900". `node` may be another name
 /// for the node.

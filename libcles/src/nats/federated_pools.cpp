@@ -54,7 +54,8 @@ class pool_transport final : public link_transport {
   public:
     explicit pool_transport(std::weak_ptr<federated_pools> by) : by_(std::move(by)) {}
 
-    [[nodiscard]] bool is_exposed(const url&) const override { return false; }
+    // NATS listens for all hosts, unless it is told otherwise, and forwards to other servers.
+    [[nodiscard]] bool is_exposed(const url&) const override { return true; }
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url&, const limits& bounds) override {
         auto by = by_.lock();
         by->listen(executor, bounds);
@@ -104,7 +105,7 @@ void federated_pools::start(core::local_node& host) {
         throw error(errc::invalid_option, "federation is refused with security: what crosses NATS is not sealed");
     }
     host_ = host.weak_from_this();
-    host.listeners().listen("pool://" + options_.pool, true);
+    host.listeners().listen("pool://" + options_.pool, host.is_insecure());
 }
 
 void federated_pools::listen(const asio::any_io_executor& executor, const limits& bounds) {

@@ -60,6 +60,8 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
 
     /// To be called once, when a shared_ptr owns this.
     void start(const std::vector<std::string>& listen_at);
+    /// Whether it may be reached from other hosts, although they are not authenticated.
+    [[nodiscard]] bool is_insecure() const noexcept { return insecure_; }
     std::string listen(std::string_view where);
     virtual void stop();
     /// Starts a graceful shutdown; the operation completes when the links have closed. Call `stop` afterwards.

@@ -117,6 +117,10 @@ void check(const config& setup) {
                            "'" + setup.multicast.interface +
                                "' can be reached from other hosts, which requires 'insecure: true'");
     }
+    if (setup.federation.is_on() && !setup.insecure && !setup.security.is_on()) {
+        throw config_error(setup.location_of("federation"),
+                           "whoever reaches the NATS server can send requests, which requires 'insecure: true'");
+    }
     if (setup.federation.is_on() && setup.security.is_on()) {
         throw config_error(setup.location_of("federation"),
                            "is refused with 'security': what crosses NATS is not sealed");

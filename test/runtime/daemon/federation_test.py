@@ -44,7 +44,7 @@ class Federation(unittest.TestCase):
         is a server."""
         work = f", {PLUGINS}/libcles-primes.so, {{path: {COUNTING}, config: {{marks: {self.marks}}}}}" if has_work else ""
         plugins = f"plugins: [{PLUGINS}/libcles-system.so{work}]\n"
-        bridge = f"federation: {{nats: '{url or server.url}', pool: {pool}{federation}}}\n" if server else f"pool: {pool}\n"
+        bridge = f"insecure: true\nfederation: {{nats: '{url or server.url}', pool: {pool}{federation}}}\n" if server else f"pool: {pool}\n"
         node = Daemon(plugins + bridge + "drain: 300ms\n" + more, base=DEFAULTS.replace("sat1", name))
         self.addCleanup(node.__exit__)
         return node
@@ -91,6 +91,19 @@ class Federation(unittest.TestCase):
         self.assertEqual(everybody, {"results": {"gate": {"value": True}, "inner": {"value": True}}, "errors": {}})
         inner.stop()
         self.assertIn(json.loads(hub.ask("PULL north.inner:utc deadline=2000"))["error"], ("unavailable", "no_target"))
+
+    def test_what_is_meant_for_a_pool_does_not_run_in_another(self):
+        server = self.server()
+        hub, gate = self.node("hub", "south", server), self.node("gate", "north", server)
+        east = self.node("east1", "east", server)
+        car = self.node("car1", "east", None, more=f"seeds: ['{east.url}']\n")
+        self.wait_for_pools(hub, gate, east)
+        wait_until(lambda: "seconds" in json.loads(gate.ask("PULL car1:utc")), "north knows the node of east")
+        self.assertEqual(json.loads(hub.ask("DELEGATE east.car1:once/1/0")), {"value": "car1"})
+        for request in ("DELEGATE north.car1:once/2/0", "BIND north.car1:utc"):
+            self.assertEqual(body(hub.ask(request))["error"], "no_target")
+        self.assertEqual(self.count_marks(2), 0)
+        self.assertEqual(car.stop()[0], 0)
 
     def test_any_and_all(self):
         server = self.server()
@@ -421,8 +434,10 @@ class Federation(unittest.TestCase):
                 ("federation: {nats: 'tcp://h:4222', pool: north}\n", "'tcp://h:4222' is not the URL of a NATS server"),
                 ("federation: {nats: 'nats://h:4222', pool: a.b}\n", "'a.b' is not a valid name of a pool"),
                 ("federation: {nats: 'nats://h:4222', pool: north, tls: {key: /k}}\n", "only one of 'certificate' and 'key'"),
-                ("pool: west\nfederation: {nats: 'nats://h:4222', pool: north}\n", "'north' is another pool than"),
-                ("federation: yes\n", "is not 'off'")):
+                ("insecure: true\npool: west\nfederation: {nats: 'nats://h:4222', pool: north}\n", "'north' is another pool than"),
+                ("federation: yes\n", "is not 'off'"),
+                ("federation: {nats: 'nats://h:4222', pool: north}\n",
+                 "federation: whoever reaches the NATS server can send requests, which requires 'insecure: true'")):
             file = self.folder.write(DEFAULTS + text)
             code, _, errors = clesd("--config", file, "--check")
             self.assertEqual(code, 2, text)
@@ -432,7 +447,7 @@ class Federation(unittest.TestCase):
         code, _, errors = clesd("--config", file, "--check")
         self.assertEqual(code, 2)
         self.assertIn("federation: is refused with 'security': what crosses NATS is not sealed", errors)
-        file = self.folder.write(DEFAULTS + "federation: {nats: ['nats://a:1', 'tls://b:2'], pool: north, token: /t, tls: {ca: /c}}\n")
+        file = self.folder.write(DEFAULTS + "insecure: true\nfederation: {nats: ['nats://a:1', 'tls://b:2'], pool: north, token: /t, tls: {ca: /c}}\n")
         _, text, _ = clesd("--config", file, "--print-config")
         self.assertIn('federation: {nats: ["nats://a:1", "tls://b:2"], pool: "north", token: "/t", tls: {ca: "/c"}}', text)
 
