@@ -28,7 +28,7 @@ FIGURE_FORM = {
     "machine": {"system": "Linux", "processor": "a <processor> & more", "cores": 2}, "skipped": [],
     "figures": [
         {"name": "one_way", "what": "one way & back <tagged>", "value": 12.5, "low": 11.25, "high": 13.75, "unit": "ms",
-         "paper": 100, "target": "\u2264 100", "reached": True},
+         "paper": 100, "target": "\u2264 100", "reached": True, "ran": "both one way & <nothing> else"},
         {"name": "spacing", "what": "spacing error", "value": 0.75, "low": None, "high": None, "unit": "m", "paper": None,
          "target": 0.5, "reached": False},
         {"name": "count", "what": "vehicles", "value": 1234567, "unit": ""}],
@@ -134,7 +134,7 @@ class Page(unittest.TestCase):
         _, root, _ = self.made(latency=FIGURE_FORM)
         rows = {}
         for row in root.iter("{http://www.w3.org/1999/xhtml}tr"):
-            rows.setdefault(words(row[0]), []).append(words(row))
+            rows.setdefault(row[0].text or words(row[0]), []).append(words(row))
         for raw in raws.values():
             figures = figures_of(raw)
             self.assertTrue(figures)
@@ -145,6 +145,7 @@ class Page(unittest.TestCase):
                     self.assertIn(" ".join(text_of(figure.paper).split()), shown, figure)
         self.assertIn("11.25 \u2013 13.75", rows["one way & back <tagged>"][-1])
         self.assertIn("reached", rows["one way & back <tagged>"][-1])
+        self.assertIn("both one way & <nothing> else", rows["one way & back <tagged>"][-1])
         self.assertIn("missed", rows["spacing error"][-1])
         for raw in raws.values():
             self.assertIn(raw["command"], words(root))
