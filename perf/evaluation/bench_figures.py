@@ -5,6 +5,7 @@ import math
 import statistics
 
 from interval import summary
+from packet_values import ROUNDED, UNROUNDED
 
 PULL_NAMES = {"tcp": "TCP", "udp": "UDP", "unix": "a Unix socket", "polling": "TCP, both ends polling for 50 us"}
 PULL_RATIOS = {"tcp": 1.10, "udp": 0.95, "unix": 0.65, "polling": 0.55}
@@ -18,14 +19,21 @@ MAX_GROWTH = 1.1  # of time by length, as an exponent: 1 is linear
 PARSE_KINDS = ("typed", "reply_typed", "validated", "reply_validated", "head", "packed")
 
 
-def figure(name, what, values, unit, paper=None, at_most=None, at_least=None):
+PULLS_RAN = "as fast as possible, one request after the other, far ends only answer, each end on a core of its own"
+BY_HAND_RAN = "by hand a packed struct over TCP by blocking sockets"
+CLES_RAN = {"tcp": "CLES over TCP, without polling", "udp": "CLES over UDP, without polling",
+            "unix": "CLES over a Unix socket, without polling",
+            "polling": "CLES over TCP, both ends poll for 50 us before they sleep"}
+
+
+def figure(name, what, values, unit, paper=None, at_most=None, at_least=None, ran=None):
     values = list(values)
     found = summary(values)
     target = f"\u2264 {at_most:g}" if at_most is not None else f"\u2265 {at_least:g}" if at_least is not None else None
     reached = None
     if target:
         reached = found["median"] <= at_most if at_most is not None else found["median"] >= at_least
-    return {"name": name, "what": what, "value": found["median"], "low": found["low"], "high": found["high"],
+    return {"name": name, "what": what, "ran": ran, "value": found["median"], "low": found["low"], "high": found["high"],
             "runs": found["runs"], "unit": unit, "paper": paper, "target": target, "reached": reached}
 
 
@@ -47,11 +55,13 @@ def pull_figures(reports):
         yield figure(f"pull_{name}_p50", f"PULL over {meaning}, round trip, p50", (r["cles"]["p50_us"] for r in rounds), "us")
         yield figure(f"pull_{name}_p99", f"PULL over {meaning}, p99", (r["cles"]["p99_us"] for r in rounds), "us")
         yield figure(f"pull_{name}_ratio", f"PULL over {meaning}, p50, to the exchange by hand over TCP",
-                     (r["cles"]["p50_us"] / r["icd"]["p50_us"] for r in rounds), "times", at_most=PULL_RATIOS[name])
+                     (r["cles"]["p50_us"] / r["icd"]["p50_us"] for r in rounds), "times", at_most=PULL_RATIOS[name],
+                     ran=f"{BY_HAND_RAN}; {CLES_RAN[name]}; {PULLS_RAN}")
         bare = f"icd_{name}"  # by hand over the same kind of socket
         if rounds[0].get(bare):
             yield figure(f"pull_{name}_bare_ratio", f"the exchange by hand over {meaning}, p50, to that over TCP",
-                         (r[bare]["p50_us"] / r["icd"]["p50_us"] for r in rounds), "times")
+                         (r[bare]["p50_us"] / r["icd"]["p50_us"] for r in rounds), "times",
+                         ran=f"both by hand, the same struct by blocking sockets; {PULLS_RAN}")
     if tcp:
         yield figure("pull_overhead", "extra time of a PULL over TCP, compared with the exchange by hand, p50",
                      ((r["cles"]["p50_us"] - r["icd"]["p50_us"]) / 1e3 for r in tcp), "ms", paper=PAPER_OVERHEAD_MS,
@@ -63,14 +73,19 @@ def bytes_figures(reports):
         return
     rows = {row["message"]: row for row in reports[0]["rows"]}
     reply, request = rows["PULL reply"], rows["PULL request"]
-    yield figure("pull_reply_bytes", "bytes of the localization in a reply to PULL", [reply["tcp"]["bytes"]], "bytes",
-                 paper=PAPER_REPLY_BYTES, at_most=PAPER_REPLY_BYTES)
-    yield figure("pull_bytes_ratio", "bytes of request and reply of a PULL, to those of the structs",
-                 [(request["tcp"]["bytes"] + reply["tcp"]["bytes"]) / (request["icd_tcp"]["bytes"] + reply["icd_tcp"]["bytes"])],
-                 "times", paper=PAPER_BYTES_RATIO, at_most=PAPER_BYTES_RATIO)
+    by_hand = request["icd_tcp"]["bytes"] + reply["icd_tcp"]["bytes"]
+    for suffix, way, values, wanted_bytes, wanted_ratio in (("", "tcp", ROUNDED, PAPER_REPLY_BYTES, PAPER_BYTES_RATIO),
+                                                            ("_unrounded", "unrounded_tcp", UNROUNDED, None, None)):
+        yield figure(f"pull_reply_bytes{suffix}", f"bytes of the localization in a reply to PULL, {values}",
+                     [reply[way]["bytes"]], "bytes", paper=PAPER_REPLY_BYTES, at_most=wanted_bytes)
+        yield figure(f"pull_bytes_ratio{suffix}", f"bytes of request and reply of a PULL, to those of the structs, {values}",
+                     [(request[way]["bytes"] + reply[way]["bytes"]) / by_hand], "times", paper=PAPER_BYTES_RATIO,
+                     at_most=wanted_ratio,
+                     ran=f"by hand structs with doubles; CLES text, {values}; both without the headers of TCP")
     headers = reports[0]["headers"]
-    longest = max(max(row["tcp"]["bytes"] + headers["tcp"], row["udp"]["bytes"] + headers["udp"]) for row in rows.values())
-    yield figure("longest_packet", "the longest packet of any verb, with the headers of IP and TCP or UDP",
+    longest = max(row[f"{values}{way}"]["bytes"] + headers[way] for row in rows.values() for values in ("", "unrounded_")
+                  for way in ("tcp", "udp"))
+    yield figure("longest_packet", "the longest packet of any verb, unrounded, with the headers of IP and TCP or UDP",
                  [longest + headers["ipv4"]], "bytes", at_most=FRAME_BYTES)
 
 
@@ -101,15 +116,19 @@ def fan_out_figures(reports):
             rows = [r["rows"][i] for r in rounds]
             n, where = row["binders"], {"tcp": "TCP", "unix": "Unix sockets", "multicast": "multicast"}[transport]
             multicast = transport == "multicast"
+            sockets = (f"by hand {n} sockets, CLES one that {n} services share" if multicast and n > 1
+                       else f"{n} socket{'s' if n > 1 else ''} on both sides")
+            pair = f"by hand a packed struct, CLES the same values as text; {sockets}, in one process, without polling"
             yield figure(f"update_{transport}_{n}_p50", f"UPDATE to {n} by {where} at 1 kHz, one way, p50",
                          (r["cles"]["paced"]["latency"]["p50_us"] for r in rows), "us")
             yield figure(f"update_{transport}_{n}_p50_ratio", f"UPDATE to {n} by {where} at 1 kHz, p50, to the same by hand",
-                         (r["ratio"]["p50"] for r in rows), "times",
+                         (r["ratio"]["p50"] for r in rows), "times", ran=f"{pair}, every millisecond",
                          at_most=MULTICAST_RATIO if multicast and n == MULTICAST_BINDERS else None)
             yield figure(f"update_{transport}_{n}_rate", f"UPDATE to {n} by {where}, deliveries in a second",
                          (r["cles"]["flat_out"]["deliveries_per_s"] for r in rows), "/s")
             yield figure(f"update_{transport}_{n}_rate_ratio", f"UPDATE to {n} by {where}, deliveries, to the same by hand",
-                         (r["ratio"]["deliveries_per_s"] for r in rows), "times", at_least=MULTICAST_RATE if multicast else None)
+                         (r["ratio"]["deliveries_per_s"] for r in rows), "times", ran=f"{pair}, as fast as possible",
+                         at_least=MULTICAST_RATE if multicast else None)
 
 
 # --- The data of pictures ------------------------------------------------------------------------------------------------

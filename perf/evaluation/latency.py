@@ -24,6 +24,7 @@ from pathlib import Path
 from clean_environment import clean_environment
 from interval import interval_over, quantile
 from linked_hosts import LinkedHosts, OneHost, why_not
+from packet_values import ROUNDED, UNROUNDED
 from provenance import command, date, machine
 from result_file import write
 
@@ -42,15 +43,16 @@ LINKS = [
 ]
 KINDS = {"icd-pull": "round trip by hand", "pull": "PULL", "icd-update": "one way by hand",
          "update": "UPDATE, one way", "update-multicast": "UPDATE by multicast, one way, of those received"}
+BOTH = "by hand a packed struct over TCP by blocking sockets; CLES over TCP, without polling; each end on a core of its own"
 
 
 class Figures:
     def __init__(self):
         self.found = []
 
-    def add(self, name, what, value, unit, interval=None, paper=None, target=None, at_most=None):
+    def add(self, name, what, value, unit, interval=None, paper=None, target=None, at_most=None, ran=None):
         low, high = interval or (value, value)
-        self.found.append({"name": name, "what": what, "value": rounded(value), "low": rounded(low),
+        self.found.append({"name": name, "what": what, "ran": ran, "value": rounded(value), "low": rounded(low),
                            "high": rounded(high), "unit": unit, "paper": paper,
                            "target": target or (f"<= {at_most:g}" if at_most is not None else None),
                            "reached": value <= at_most if at_most is not None else None})
@@ -96,7 +98,9 @@ def loopback_figures(figures, rounds):
         return lambda some: statistics.median(one[kind][key] for one in some)
 
     add_latencies(figures, rounds, "loopback", "on loopback",
-                  {"p50": lambda kind: typical(kind, "p50_us"), "p99": lambda kind: typical(kind, "p99_us")})
+                  {"p50": lambda kind: typical(kind, "p50_us"), "p99": lambda kind: typical(kind, "p99_us")},
+                  {"pull": f"both far ends only answer, one request after the other; {BOTH}",
+                   "update": f"both publish every millisecond to one subscriber; {BOTH}"}, at_most=WANTED_RATIO)
     figures.over(rounds, "loopback_pull_overhead", "what CLES adds to a round trip on loopback, p50", "us",
                  lambda some: typical("pull", "p50_us")(some) - typical("icd-pull", "p50_us")(some),
                  paper=PAPER_OVERHEAD_US, at_most=PAPER_OVERHEAD_US)
@@ -122,9 +126,7 @@ class Link:
 
     def timed(self, kind, count):
         """Runs the far end only meanwhile, because its publications would wake a core during the others' turns."""
-        words = [kind] if kind.startswith("icd-") else ["car"]
-        if kind == "update-multicast":
-            words += ["--multicast", self.hosts.groups["far"]]
+        words = ["update", "--multicast", self.hosts.groups["far"]] if kind == "update-multicast" else [kind]
         with self.hosts.running("far", self.timing, "serve", *words, f"tcp://{self.hosts.addresses['far']}:0",
                                 *self.pace) as url:
             where = self.hosts.groups["near"] if kind == "update-multicast" else url
@@ -152,16 +154,19 @@ def link_figures(figures, found):
     def pooled(kind, share):
         return lambda some: quantile([us for one in some for us in one[kind]], share)
 
-    for name, meaning, *_ in LINKS:
+    for name, meaning, _, interval_ms in LINKS:
         if name in found:
             of = {"p50": lambda kind: pooled(kind, 0.5), "p99": lambda kind: pooled(kind, 0.99)}
-            add_latencies(figures, found[name], name, meaning, of, like_for_like=False)
-            add_one_way(figures, found[name], name, meaning, of)
+            ran = {"pull": f"both far ends only answer, one request every {interval_ms} ms, and sleep in between; {BOTH}",
+                   "update": f"both far ends publish every {interval_ms} ms to one subscriber; {BOTH}"}
+            add_latencies(figures, found[name], name, meaning, of, ran)
+            add_one_way(figures, found[name], name, meaning, of,
+                        f"both by CLES every {interval_ms} ms: a far end that only publishes, and one that only answers; "
+                        "without polling; each end on a core of its own")
 
 
-def add_latencies(figures, rounds, name, meaning, statistics_of, like_for_like=True):
-    """Adds each exchange, and the ratio of CLES to the hand-written one. Paced PULLs are not compared: the far end of CLES
-    also publishes meanwhile, that of the hand-written exchange sleeps."""
+def add_latencies(figures, rounds, name, meaning, statistics_of, ran, at_most=None):
+    """Adds each exchange, and the ratio of CLES to the hand-written one. `ran` tells what both did."""
     for key, of in statistics_of.items():
         for kind, what in KINDS.items():
             figures.over(rounds, f"{name}_{kind.replace('-', '_')}_{key}", f"{what}, {meaning}, {key}", "us", of(kind))
@@ -169,22 +174,21 @@ def add_latencies(figures, rounds, name, meaning, statistics_of, like_for_like=T
         def ratio(above, below, of=of):
             return lambda some: of(above)(some) / of(below)(some)
 
-        wanted = {"at_most": WANTED_RATIO} if key == "p50" else {}
-        if like_for_like:
-            figures.over(rounds, f"{name}_pull_ratio_{key}", f"PULL to by hand, {meaning}, {key}", "times",
-                         ratio("pull", "icd-pull"), **wanted)
+        wanted = {"at_most": at_most} if key == "p50" else {}
+        figures.over(rounds, f"{name}_pull_ratio_{key}", f"PULL to by hand, {meaning}, {key}", "times",
+                     ratio("pull", "icd-pull"), ran=ran["pull"], **wanted)
         figures.over(rounds, f"{name}_update_ratio_{key}", f"UPDATE to by hand, {meaning}, {key}", "times",
-                     ratio("update", "icd-update"))
+                     ratio("update", "icd-update"), ran=ran["update"])
 
 
-def add_one_way(figures, rounds, name, meaning, statistics_of):
+def add_one_way(figures, rounds, name, meaning, statistics_of, ran):
     """Only if both have the same pace, because cores that sleep longer take longer to wake."""
     for key, of in statistics_of.items():
         wanted = {"at_most": WANTED_ONE_WAY} if key == "p50" else {}
         for kind, what in (("update", "UPDATE one way"), ("update-multicast", "UPDATE by multicast one way")):
             figures.over(rounds, f"{name}_{kind.replace('-', '_')}_to_pull_{key}",
                          f"{what} to PULL's round trip, {meaning}, {key}", "times",
-                         lambda some, of=of, kind=kind: of(kind)(some) / of("pull")(some), **wanted)
+                         lambda some, of=of, kind=kind: of(kind)(some) / of("pull")(some), ran=ran, **wanted)
 
 
 # --- Bytes and lines ---------------------------------------------------------------------------------------------------
@@ -192,13 +196,20 @@ def add_one_way(figures, rounds, name, meaning, statistics_of):
 
 def add_sizes(figures, programs):
     rows = {row["message"]: row for row in bench(programs, "--bytes")["rows"]}
-    ours, by_hand = (sum(rows[f"PULL {part}"][way]["bytes"] for part in ("request", "reply")) for way in ("tcp", "icd_tcp"))
-    figures.add("pull_bytes", "PULL, request and reply by TCP, without its headers", ours, "bytes", paper=PAPER_BYTES,
-                at_most=WANTED_BYTES)
-    figures.add("icd_bytes", "the same by hand", by_hand, "bytes")
-    figures.add("bytes_ratio", "PULL to by hand, bytes", ours / by_hand, "times", paper=PAPER_BYTES_RATIO,
-                at_most=PAPER_BYTES_RATIO)
-    figures.add("reply_bytes", "PULL, the reply alone", rows["PULL reply"]["tcp"]["bytes"], "bytes")
+    by_hand = pull_bytes(rows, "icd_tcp")
+    figures.add("icd_bytes", "request and reply of the struct by hand, by TCP, without its headers", by_hand, "bytes")
+    for prefix, way, values, wanted_bytes, wanted_ratio in (("", "tcp", ROUNDED, WANTED_BYTES, PAPER_BYTES_RATIO),
+                                                            ("unrounded_", "unrounded_tcp", UNROUNDED, None, None)):
+        figures.add(f"{prefix}pull_bytes", f"PULL, request and reply by TCP, without its headers, {values}",
+                    pull_bytes(rows, way), "bytes", paper=PAPER_BYTES, at_most=wanted_bytes)
+        figures.add(f"{prefix}bytes_ratio", f"PULL to by hand, bytes, {values}", pull_bytes(rows, way) / by_hand, "times",
+                    paper=PAPER_BYTES_RATIO, at_most=wanted_ratio,
+                    ran=f"by hand a struct with doubles; CLES text, {values}; both without the headers of TCP")
+        figures.add(f"{prefix}reply_bytes", f"PULL, the reply alone, {values}", rows["PULL reply"][way]["bytes"], "bytes")
+
+
+def pull_bytes(rows, way):
+    return sum(rows[f"PULL {part}"][way]["bytes"] for part in ("request", "reply"))
 
 
 def add_lines(figures):
@@ -208,7 +219,8 @@ def add_lines(figures):
                 paper=PAPER_LINES, at_most=WANTED_LINES)
     figures.add("icd_lines", "the same by hand", by_hand["lines"], "lines", paper=PAPER_LINES * PAPER_LINES_RATIO)
     figures.add("lines_ratio", "by hand to CLES, source lines", by_hand["lines"] / ours["lines"], "times",
-                paper=PAPER_LINES_RATIO)
+                paper=PAPER_LINES_RATIO,
+                ran="two whole programs that pass the same test: server and client, command line, errors")
     figures.add("cles_lines_all", "source lines by CLES with includes", sum(ours.values()), "lines")
     figures.add("icd_lines_all", "the same by hand", sum(by_hand.values()), "lines")
 

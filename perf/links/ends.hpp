@@ -16,12 +16,17 @@ namespace cles::perf {
 /// Called with the URL once the server listens.
 using announcement = std::function<void(std::string_view)>;
 
-/// By the library: a node "car1" that answers PULL of "localization", and publishes it at each interval.
-/// \param group where to take part in multicast, as `parse_multicast` reads it
-void serve_car(std::string_view url, std::string_view group, std::chrono::milliseconds interval,
-               const announcement& announce);
+// One that answers requests does nothing else, by the library and by hand: if it also published, its core would be
+// awake when a request arrives.
+
+/// By the library: a node "car1" that answers PULL of "localization".
+void serve_replies(std::string_view url, const announcement& announce);
 /// By hand: answers each request.
 void serve_replies_by_hand(std::string_view url, const announcement& announce);
+/// By the library: a node "car1" that publishes "localization" at each interval.
+/// \param group where to take part in multicast, as `parse_multicast` reads it
+void serve_updates(std::string_view url, std::string_view group, std::chrono::milliseconds interval,
+                   const announcement& announce);
 /// By hand: sends the packet of a reply at each interval, to one client after the other.
 void serve_updates_by_hand(std::string_view url, std::chrono::milliseconds interval, const announcement& announce);
 

@@ -29,10 +29,12 @@ struct settings {
 void print(std::string_view url) { std::cout << url << std::endl; }
 
 void serve(const settings& given, std::chrono::milliseconds interval) {
-    if (given.what == "car") {
-        perf::serve_car(given.url, given.group, interval, print);
+    if (given.what == "pull") {
+        perf::serve_replies(given.url, print);
     } else if (given.what == "icd-pull") {
         perf::serve_replies_by_hand(given.url, print);
+    } else if (given.what == "update") {
+        perf::serve_updates(given.url, given.group, interval, print);
     } else {
         perf::serve_updates_by_hand(given.url, interval, print);
     }
@@ -52,11 +54,11 @@ int main(int argc, char** argv) {
     program.require_subcommand(1);
     settings given;
     auto* serving = program.add_subcommand("serve", "The end that has the data; prints its URL, and runs until killed");
-    serving->add_option("what", given.what, "car (CLES), icd-pull or icd-update")
+    serving->add_option("what", given.what, "pull, update, icd-pull or icd-update")
         ->required()
-        ->check(CLI::IsMember({"car", "icd-pull", "icd-update"}));
+        ->check(CLI::IsMember({"pull", "update", "icd-pull", "icd-update"}));
     serving->add_option("url", given.url, "Where to listen, such as tcp://10.0.0.1:0")->required();
-    serving->add_option("--multicast", given.group, "IFACE[,GROUP[:PORT]], or off")->capture_default_str();
+    serving->add_option("--multicast", given.group, "Of update: IFACE[,GROUP[:PORT]], or off")->capture_default_str();
     auto* asking =
         program.add_subcommand("time", "The end that requests the data; prints microseconds as a JSON array");
     asking->add_option("what", given.what, "pull, update, update-multicast, icd-pull or icd-update")

@@ -52,14 +52,10 @@ void send_updates(int client, std::chrono::milliseconds interval) {
 
 } // namespace
 
-void serve_car(std::string_view url, std::string_view group, std::chrono::milliseconds interval,
-               const announcement& announce) {
+void serve_replies(std::string_view url, const announcement& announce) {
     asio::io_context io{1};
-    cles::service car{
-        io, {.name = "car1", .listen = {std::string{url}}, .insecure = true, .multicast = parse_multicast(group)}};
+    cles::service car{io, {.name = "car1", .listen = {std::string{url}}, .insecure = true}};
     register_localization(car);
-    car.on_bind("localization"); // from the beginning, before anything is published
-    asio::co_spawn(io, publish(car, interval), rethrow);
     announce(car.endpoints().front());
     io.run();
 }
@@ -68,6 +64,17 @@ void serve_replies_by_hand(std::string_view url, const announcement& announce) {
     icd::server server{parse_url(url)};
     announce(to_string(server.where()));
     server.run();
+}
+
+void serve_updates(std::string_view url, std::string_view group, std::chrono::milliseconds interval,
+                   const announcement& announce) {
+    asio::io_context io{1};
+    cles::service car{
+        io, {.name = "car1", .listen = {std::string{url}}, .insecure = true, .multicast = parse_multicast(group)}};
+    car.on_bind("localization"); // from the beginning, before anything is published
+    asio::co_spawn(io, publish(car, interval), rethrow);
+    announce(car.endpoints().front());
+    io.run();
 }
 
 void serve_updates_by_hand(std::string_view url, std::chrono::milliseconds interval, const announcement& announce) {

@@ -5,7 +5,6 @@
 
 #include "byte_tap.hpp"
 #include "datagram_tap.hpp"
-#include "perf/support/localization.hpp"
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -21,8 +20,8 @@ namespace {
 
 constexpr const char* noun = "car1:localization";
 
-void register_all(service& car) {
-    car.on_pull("localization", [served = std::uint64_t{0}]() mutable { return sample(served++); });
+void register_all(service& car, packet_source packets) {
+    car.on_pull("localization", [packets, served = std::uint64_t{0}]() mutable { return packets(served++); });
     car.on_push("localization", [](const localization&) {});
     car.on_delegate("localization", [](const localization& value) { return value; });
     car.on_update("localization", [](const localization&) {});
@@ -47,7 +46,8 @@ class meter {
 };
 
 template <class Tap>
-asio::awaitable<void> measure(service& car, service& client, const Tap& tap, std::uint64_t exchanges, verb_bytes& out) {
+asio::awaitable<void> measure(service& car, service& client, const Tap& tap, std::uint64_t exchanges,
+                              packet_source packets, verb_bytes& out) {
     const meter pulls{tap};
     for (std::uint64_t i = 0; i < exchanges; ++i) {
         co_await client.async_pull<localization>(noun);
@@ -56,19 +56,19 @@ asio::awaitable<void> measure(service& car, service& client, const Tap& tap, std
 
     const meter pushes{tap};
     for (std::uint64_t i = 0; i < exchanges; ++i) {
-        co_await client.async_push(noun, sample(i));
+        co_await client.async_push(noun, packets(i));
     }
     out.push = pushes.mean(exchanges);
 
     const meter delegates{tap};
     for (std::uint64_t i = 0; i < exchanges; ++i) {
-        co_await client.async_delegate<localization>(noun, sample(i));
+        co_await client.async_delegate<localization>(noun, packets(i));
     }
     out.delegate = delegates.mean(exchanges);
 
     const meter asks{tap};
     for (std::uint64_t i = 0; i < exchanges; ++i) {
-        co_await client.async_request("UPDATE " + std::string{noun} + " " + to_json(sample(i)));
+        co_await client.async_request("UPDATE " + std::string{noun} + " " + to_json(packets(i)));
     }
     out.ask = asks.mean(exchanges);
 
@@ -82,9 +82,9 @@ asio::awaitable<void> measure(service& car, service& client, const Tap& tap, std
     }
     const meter updates{tap};
     for (std::uint64_t i = 0; i < exchanges; ++i) {
-        car.update("localization", sample(i));
+        car.update("localization", packets(i));
         const auto item = co_await feed.async_next();
-        if (item.kind != feed_event::update || item.value != sample(i)) {
+        if (item.kind != feed_event::update || item.value != packets(i)) {
             throw error(errc::failed, "an update was lost");
         }
     }
@@ -92,15 +92,15 @@ asio::awaitable<void> measure(service& car, service& client, const Tap& tap, std
 }
 
 template <class Tap>
-verb_bytes measure_by(const std::string& url, std::uint64_t exchanges) {
+verb_bytes measure_by(const std::string& url, std::uint64_t exchanges, packet_source packets) {
     asio::io_context io{1};
     service car{io, {.name = "car1", .listen = {url}}};
-    register_all(car);
+    register_all(car, packets);
     const Tap tap{parse_url(car.endpoints().front())};
     service client{io, {.name = "bench", .peers = {{"car1", tap.url()}}}};
     verb_bytes out;
     std::exception_ptr failure;
-    asio::co_spawn(io, measure(car, client, tap, exchanges, out), [&](std::exception_ptr thrown) {
+    asio::co_spawn(io, measure(car, client, tap, exchanges, packets, out), [&](std::exception_ptr thrown) {
         failure = std::move(thrown);
         io.stop();
     });
@@ -115,9 +115,9 @@ verb_bytes measure_by(const std::string& url, std::uint64_t exchanges) {
 
 } // namespace
 
-verb_bytes measure_bytes(const std::string& scheme, std::uint64_t exchanges) {
-    return scheme == "udp" ? measure_by<datagram_tap>("udp://127.0.0.1:0", exchanges)
-                           : measure_by<byte_tap>("tcp://127.0.0.1:0", exchanges);
+verb_bytes measure_bytes(const std::string& scheme, std::uint64_t exchanges, packet_source packets) {
+    return scheme == "udp" ? measure_by<datagram_tap>("udp://127.0.0.1:0", exchanges, packets)
+                           : measure_by<byte_tap>("tcp://127.0.0.1:0", exchanges, packets);
 }
 
 } // namespace cles::perf

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "perf/support/localization.hpp"
+
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -23,8 +25,11 @@ struct verb_bytes {
     double update = 0;         ///< a published packet, which has no reply
 };
 
+/// The nth values of the packet.
+using packet_source = const localization& (*)(std::uint64_t n) noexcept;
+
 /// Measured by a relay between two services of this process, over "tcp" or "udp".
 /// \throws cles::error if an exchange fails
-verb_bytes measure_bytes(const std::string& scheme, std::uint64_t exchanges);
+verb_bytes measure_bytes(const std::string& scheme, std::uint64_t exchanges, packet_source packets);
 
 } // namespace cles::perf

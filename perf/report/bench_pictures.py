@@ -30,7 +30,8 @@ def kinds(series, note):
         found.append(("fan_out", "UPDATE of the localization to many binders in one process: the way of one at 1 kHz, and "
                       "deliveries as fast as possible. Dashed: by hand.", lambda: fan_out(series["fan_out"], note)))
     if series.get("bytes"):
-        found.append(("bytes", "Bytes of the localization packet over TCP, message for message, without headers.",
+        found.append(("bytes", "Bytes of the localization packet over TCP, message for message, without headers; with values "
+                      "rounded as a user would, and with all digits of a double.",
                       lambda: sizes(series["bytes"], note)))
     return found
 
@@ -121,8 +122,9 @@ unset multiplot
 
 
 def sizes(rows, note):
-    data = block("rows", [(row["message"], row["icd_tcp"]["bytes"], row["tcp"]["bytes"]) for row in rows])
-    most = max(row["tcp"]["bytes"] for row in rows)
+    data = block("rows", [(row["message"], row["icd_tcp"]["bytes"], row["tcp"]["bytes"], row["unrounded_tcp"]["bytes"])
+                          for row in rows])
+    most = max(row["unrounded_tcp"]["bytes"] for row in rows)
     return draw("bytes", data + f"""set style data histograms
 set style histogram clustered gap 1
 set boxwidth 0.9
@@ -130,8 +132,9 @@ set yrange [0:{max(most, 132) * 1.1}]
 set ylabel 'bytes'
 set xtics rotate by -35
 set bmargin 8
-set rmargin at screen 0.79
-set key at screen 0.81,0.95 left top Left reverse samplen 2
-plot $rows using 2:xtic(1) linecolor '#999999' title 'struct by hand', '' using 3 linecolor '#0072b2' title 'CLES', \\
+set rmargin at screen 0.76
+set key at screen 0.775,0.95 left top Left reverse samplen 2
+plot $rows using 2:xtic(1) linecolor '#999999' title 'struct by hand', '' using 3 linecolor '#0072b2' title 'CLES, rounded', \\
+     '' using 4 linecolor '#56b4e9' title 'CLES, unrounded', \\
      132 with lines linecolor '#d55e00' dashtype (6,4) linewidth 1.5 title 'paper''s reply'
 """, 860, 400, note)

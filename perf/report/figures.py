@@ -17,6 +17,7 @@ class Figure:
     paper: Any = None
     target: Any = None
     reached: Any = None  # None without a target
+    ran: str = ""  # of a ratio: what each side ran
 
 
 class Malformed(Exception):
@@ -38,7 +39,7 @@ def figures_of(raw):
 def _of_figure(each):
     return Figure(name=str(each["name"]), what=str(each.get("what") or each["name"]), value=each["value"],
                   low=each.get("low"), high=each.get("high"), runs=each.get("runs"), unit=each.get("unit") or "",
-                  paper=each.get("paper"), target=each.get("target"), reached=each.get("reached"))
+                  paper=each.get("paper"), target=each.get("target"), reached=each.get("reached"), ran=each.get("ran") or "")
 
 
 def _of_table(raw):
@@ -60,7 +61,7 @@ def _of_table(raw):
         yield Figure("mse_found_again", "each error is found again by a program that makes the data a second time, to 1e-9",
                      "yes" if checks["mse_found_again"] else "no", target="yes", reached=checks["mse_found_again"])
     yield Figure("weighted_to_even", "both hosts: elapsed with shards by speed, to even ones", checks["weighted_to_even"],
-                 unit="times")
+                 unit="times", ran="the same daemons on both hosts and the same data; only the division into shards differs")
 
 
 def _summarised(summary, name, what, unit, **beside):

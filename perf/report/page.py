@@ -100,7 +100,8 @@ def _figure_row(figure, section=""):
         spread = f"{text_of(figure.low)} \u2013 {text_of(figure.high)}"
     first = f'<td><a href="#{escape(section)}">{escape(section)}</a></td>' if section else ""
     kind = {True: " reached", False: " missed"}.get(figure.reached, "")
-    return (f'<tr>{first}<td title="{escape(figure.name)}">{escape(figure.what)}</td>'
+    ran = f'<div class="ran">{escape(figure.ran)}</div>' if figure.ran else ""
+    return (f'<tr>{first}<td title="{escape(figure.name)}">{escape(figure.what)}{ran}</td>'
             f'<td class="number">{escape(with_unit(figure.value, figure.unit))}</td><td class="spread">{escape(spread)}</td>'
             f'<td class="number">{escape(text_of(figure.runs)) if figure.runs else ""}</td>'
             f'<td class="number">{escape(with_unit(figure.paper, figure.unit))}</td>'

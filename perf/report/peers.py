@@ -13,11 +13,12 @@ def readable(rows):
     """For a table: ratios to the hand-written exchange over TCP, and sizes."""
     return [{"": row["name"], **{heading: _times(value) for heading, value in row["ratios"].items()},
              "memory, KiB": row.get("memory_kib"), "libraries, KiB": _kib(row.get("library_bytes")),
-             "program, KiB": _kib(row.get("program_bytes")), "version": str(row.get("version") or "")} for row in rows]
+             "program, KiB": _kib(row.get("program_bytes")), "version": str(row.get("version") or ""),
+             "ran": str(row.get("settings") or "")} for row in rows]
 
 
 EXPLANATION = ("Ratios of medians to the hand-written exchange over TCP, which is the row of 1; times below 1 and rates above 1 are "
-        "better. A dash means that a peer does not offer it, or that it was not measured.")
+        "better. Each row ran the same packet between two processes, with the settings of its last column. A dash means that a peer does not offer it, or that it was not measured.")
 
 
 def _times(value):

@@ -32,7 +32,7 @@ def _kinds(section, raw):
         return dsgd_picture.kinds(raw, note)
     if section == "latency" and "links" in raw:
         return latency_pictures.kinds(raw, note)
-    if section == "strike_latency" and "rounds" in raw:
+    if section == "strike_latency" and "setups" in raw:
         return strike_picture.kinds(raw, note)
     if peers.is_of_peers(raw):
         return peers.kinds(raw, note)

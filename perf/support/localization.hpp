@@ -23,6 +23,9 @@ BOOST_DESCRIBE_STRUCT(localization, (), (utc, lat, lon, velocity, acceleration))
 /// user would round them.
 const localization& sample(std::uint64_t n) noexcept;
 
+/// Such values with all their digits, as a computation yields them: as text they are longer.
+const localization& unrounded_sample(std::uint64_t n) noexcept;
+
 /// Whether these are the values of a sample, which a client checks for each answer.
 bool is_sample(const localization& value) noexcept;
 

@@ -10,6 +10,7 @@ FOLDER holds the measurement, PROGRAMS the `cles` command.
 import contextlib
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,7 @@ FOLDER, PROGRAMS = sys.argv[1], sys.argv[2]
 sys.path[:0] = [FOLDER, str(Path(__file__).parents[1] / "perf")]
 import interval  # noqa: E402
 import latency  # noqa: E402
+import linked_hosts  # noqa: E402
 import reported  # noqa: E402
 from run_within import run_within  # noqa: E402
 
@@ -68,7 +70,7 @@ class Latency(unittest.TestCase):
     def test_every_figure_says_what_it_is_and_how_sure(self):
         self.assertEqual(len(self.figures), len(self.result["figures"]))  # no name twice
         for figure in self.result["figures"]:
-            self.assertEqual(set(figure), {"name", "what", "value", "low", "high", "unit", "paper", "target", "reached"})
+            self.assertEqual(set(figure), {"name", "what", "ran", "value", "low", "high", "unit", "paper", "target", "reached"})
             self.assertLessEqual(figure["low"], figure["high"], figure)
             self.assertEqual(figure["target"] is None, figure["reached"] is None, figure)
 
@@ -84,14 +86,18 @@ class Latency(unittest.TestCase):
             self.assertEqual(len(self.result["series"]["loopback"][f"{kind}_p50_us"]), 3)
         self.assertEqual(self.figures["loopback_pull_ratio_p50"]["target"], "<= 1.1")
 
-    def test_paced_pulls_are_not_compared(self):
-        compared = [name for name in self.figures if "_pull_ratio_" in name]
-        self.assertEqual(compared, ["loopback_pull_ratio_p50", "loopback_pull_ratio_p99"])
+    def test_paced_pulls_are_compared_and_say_what_ran(self):
+        for name, _, _, interval_ms in latency.LINKS:
+            if name in self.result["links"]:
+                for figure in (self.figures[f"{name}_pull_ratio_p50"], self.figures[f"{name}_pull_ratio_p99"]):
+                    self.assertIn(f"both far ends only answer, one request every {interval_ms} ms", figure["ran"])
 
     def test_sizes_are_those_of_the_protocol(self):
         self.assertEqual(self.value("icd_bytes"), 48)
         self.assertTrue(self.figures["pull_bytes"]["reached"], self.figures["pull_bytes"])
         self.assertGreater(self.value("pull_bytes"), 100)
+        self.assertGreater(self.value("unrounded_pull_bytes"), self.value("pull_bytes") + 5 * 4)  # each value is longer
+        self.assertEqual(self.value("unrounded_bytes_ratio"), latency.rounded(self.value("unrounded_pull_bytes") / 48))
         self.assertTrue(self.figures["cles_lines"]["reached"], self.figures["cles_lines"])
         self.assertGreater(self.value("lines_ratio"), 1)
 
@@ -119,6 +125,47 @@ class Latency(unittest.TestCase):
                 self.assertNotIn(self.mark.encode(), (folder / "environ").read_bytes().split(b"\0"))
             except OSError:
                 continue  # it has ended meanwhile, or is not ours
+
+
+class FarEnds(unittest.TestCase):
+    """The two that answer PULLs do the same, so that their latencies can be compared."""
+
+    def setUp(self):
+        self.hosts = self.enterContext(linked_hosts.OneHost())
+        self.program = str(Path(PROGRAMS).parent / "perf" / "links" / "cles_link_latency")
+
+    def far_end(self, kind):
+        return self.enterContext(self.hosts.running("far", self.program, "serve", kind, "tcp://127.0.0.1:0", "--interval", "1"))
+
+    def timed(self, kind, url, count):
+        return subprocess.run([self.program, "time", kind, url, "--count", str(count), "--interval", "1"], capture_output=True,
+                              text=True, timeout=60, check=False)
+
+    @staticmethod
+    def wake_ups(process):
+        status = Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8")
+        return int(re.search(r"^voluntary_ctxt_switches:\s*(\d+)", status, re.MULTILINE)[1])
+
+    def test_both_sleep_unless_they_are_asked(self):
+        publisher = self.far_end("icd-update")
+        for kind in ("pull", "icd-pull"):
+            with self.subTest(kind):
+                url = self.far_end(kind)
+                process = self.hosts.processes[-1]
+                self.assertEqual(len(json.loads(self.timed(kind, url, 1).stdout)), 1)
+                before = self.wake_ups(process)
+                self.assertEqual(len(json.loads(self.timed("icd-update", publisher, 200).stdout)), 200)  # takes 200 ms
+                self.assertLess(self.wake_ups(process) - before, 20)
+
+    def test_the_one_that_answers_publishes_nothing(self):
+        refused = self.timed("update", self.far_end("pull"), 1)
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("no_task", refused.stderr)
+
+    def test_the_one_that_publishes_answers_nothing(self):
+        refused = self.timed("pull", self.far_end("update"), 1)
+        self.assertEqual(refused.returncode, 1)
+        self.assertIn("no_task", refused.stderr)
 
 
 class Statistics(unittest.TestCase):

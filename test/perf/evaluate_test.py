@@ -13,6 +13,7 @@ import unittest
 from pathlib import Path
 from xml.etree import ElementTree
 
+import reported
 from run_within import run_within
 
 ROOT, BUILD = Path(sys.argv[1]), Path(sys.argv[2])
@@ -45,6 +46,7 @@ class Quick(unittest.TestCase):
             if told["state"] == "ran":
                 with self.subTest(section=name):
                     self.assertTrue(figures.figures_of(raws[name]) or raws[name].get("rows"), "neither a figure nor a row")
+                    reported.check_ratios(self, figures.figures_of(raws[name]))
         self.assertEqual((run["sections"]["bench"]["state"], run["sections"]["dsgd"]["state"]), ("ran", "ran"))
         for key in ("command", "date", "compiler", "machine"):
             self.assertTrue(run[key], key)

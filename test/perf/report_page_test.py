@@ -28,7 +28,7 @@ FIGURE_FORM = {
     "machine": {"system": "Linux", "processor": "a <processor> & more", "cores": 2}, "skipped": [],
     "figures": [
         {"name": "one_way", "what": "one way & back <tagged>", "value": 12.5, "low": 11.25, "high": 13.75, "unit": "ms",
-         "paper": 100, "target": "\u2264 100", "reached": True},
+         "paper": 100, "target": "\u2264 100", "reached": True, "ran": "both one way & <nothing> else"},
         {"name": "spacing", "what": "spacing error", "value": 0.75, "low": None, "high": None, "unit": "m", "paper": None,
          "target": 0.5, "reached": False},
         {"name": "count", "what": "vehicles", "value": 1234567, "unit": ""}],
@@ -50,11 +50,12 @@ def strike():
     def figure(name, value, **more):
         return {"name": name, "what": name, "value": value, "low": value - 1, "high": value + 1, "runs": 3, "unit": "us", **more}
 
-    figures = [figure(f"strike_{name}_{q}", times * p50 + 1) for name, p50 in (("idle", 40.0), ("loaded", 60.0))
-               for q, times in (("p50", 1), ("p99", 3))]
+    figures = [figure(f"strike_{setup}{name}_{q}", times * p50 + 1) for setup in ("", "default_")
+               for name, p50 in (("idle", 40.0), ("loaded", 60.0)) for q, times in (("p50", 1), ("p99", 3))]
+    both = {"idle": rounds(40.0), "loaded": rounds(60.0)}
     ratio = figure("strike_ratio", 1.5, what="p99 of the saturated node, to the idle one", target="at most 2", reached=True)
-    return {"title": "Strikes", "figures": [*figures, ratio], "rounds": {"idle": rounds(40.0), "loaded": rounds(60.0)},
-            "machine": "a machine", "date": "2026-01-02", "command": "c"}
+    return {"title": "Strikes", "figures": [*figures, ratio], "rounds": {"urgent": both, "default": both},
+            "setups": {"urgent": "one worker", "default": "two workers"}, "machine": "a machine", "date": "2026-01-02", "command": "c"}
 
 
 def peers():
@@ -133,7 +134,7 @@ class Page(unittest.TestCase):
         _, root, _ = self.made(latency=FIGURE_FORM)
         rows = {}
         for row in root.iter("{http://www.w3.org/1999/xhtml}tr"):
-            rows.setdefault(words(row[0]), []).append(words(row))
+            rows.setdefault(row[0].text or words(row[0]), []).append(words(row))
         for raw in raws.values():
             figures = figures_of(raw)
             self.assertTrue(figures)
@@ -144,6 +145,7 @@ class Page(unittest.TestCase):
                     self.assertIn(" ".join(text_of(figure.paper).split()), shown, figure)
         self.assertIn("11.25 \u2013 13.75", rows["one way & back <tagged>"][-1])
         self.assertIn("reached", rows["one way & back <tagged>"][-1])
+        self.assertIn("both one way & <nothing> else", rows["one way & back <tagged>"][-1])
         self.assertIn("missed", rows["spacing error"][-1])
         for raw in raws.values():
             self.assertIn(raw["command"], words(root))
@@ -210,7 +212,8 @@ class Pictures(unittest.TestCase):
         root = ElementTree.fromstring(folder.page())
         shown = {each.get("id"): words(each) for each in root.iter("{http://www.w3.org/1999/xhtml}figure")}
         self.assertIn("UPDATE, one way", shown["picture-link_cable"])
-        self.assertIn("saturated node", shown["picture-strike"])
+        self.assertIn("saturated node, defaults", shown["picture-strike"])
+        self.assertIn("The node has one worker; with the defaults, two workers", shown["picture-strike"])
         self.assertIn("cles tcp", shown["picture-peers"])
         rows = [words(each) for each in root.iter("{http://www.w3.org/1999/xhtml}tr")]
         self.assertTrue([row for row in rows if row.startswith("cles tcp1.125\u20135 120")], rows)
