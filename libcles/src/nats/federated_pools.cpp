@@ -5,6 +5,8 @@
 #include <cles/json_writer.hpp>
 
 #include "node/local_node.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
 
 #include <boost/asio/post.hpp>
 
@@ -217,10 +219,19 @@ void federated_pools::on_wake() {
     if (stopped_) {
         return;
     }
-    for (auto& each : connection_->take()) {
-        events_.push_back(std::move(each));
-    }
+    more_waits_ = true;
+    take_events();
     run();
+}
+
+// Only when those of the last time have been passed on: until then the thread keeps what it receives, and stops reading
+// when that is too much.
+void federated_pools::take_events() {
+    if (events_.empty() && std::exchange(more_waits_, false)) {
+        for (auto& each : connection_->take()) {
+            events_.push_back(std::move(each));
+        }
+    }
 }
 
 void federated_pools::run_later() {
@@ -252,7 +263,8 @@ void federated_pools::run() {
         return;
     }
     connection_->flush();
-    if (!events_.empty() || !ready_.empty()) {
+    take_events();
+    if (!events_.empty() || !ready_.empty() || !refused_.empty()) {
         run_later();
     }
     set_timer();
@@ -269,6 +281,7 @@ void federated_pools::run_batches() {
         serve_dials();
         hand_over_all();
         if (!stopped_) {
+            answer_refused();
             bridge_->on_batch();
         }
     }
@@ -382,7 +395,38 @@ void federated_pools::deliver(const bridge_link& on, std::string line) {
             return;
         }
     }
-    found->second->deliver(std::move(line));
+    if (!found->second->is_full() || !refuse(on, line)) {
+        found->second->deliver(std::move(line));
+    }
+}
+
+// Returns false for what has to reach the node: cancellations, bindings, and replies to its own requests, which are as
+// many as the node has asked for.
+bool federated_pools::refuse(const bridge_link& on, std::string_view line) {
+    protocol::request_line r;
+    protocol::malformed_request wrong;
+    if (protocol::is_reply(line) || !protocol::parse_request(line, r, wrong)) {
+        return false;
+    }
+    if (on.what == bridge_link::role::to_pool) {
+        return r.is_update(); // shows as a gap
+    }
+    if (on.what != bridge_link::role::from_pool || r.noun.target == "self") {
+        return false;
+    }
+    refused_.emplace_back(on, r.id); // the bridge is not called from inside its own call
+    return true;
+}
+
+// As the node's replies, before the bridge acknowledges the requests of this batch.
+void federated_pools::answer_refused() {
+    for (const auto& [on, id] : std::exchange(refused_, {})) {
+        auto reply = "id=" + std::to_string(id) + " ";
+        protocol::append_failure(reply, {.code = errc::busy,
+                                         .message = "too many requests of other pools wait at this bridge",
+                                         .retry_ms = protocol::default_retry_ms});
+        bridge_->on_line(on, reply, now());
+    }
 }
 
 template <class Condition>

@@ -55,7 +55,7 @@ struct event {
 class nats_connection {
   public:
     static constexpr std::size_t max_unsent = 4U << 20U;
-    static constexpr std::size_t max_untaken = 8U << 20U;
+    static constexpr std::size_t max_untaken = 4U << 20U;
 
     /// \param wake called on another thread when there are events, until `stop`
     nats_connection(server_options options, std::function<void()> wake);

@@ -11,6 +11,8 @@ namespace {
 
 constexpr int lines_per_turn = 1024;
 
+std::size_t memory_of(const std::string& line) { return line.size() + sizeof line; }
+
 std::string address_of(const bridging::bridge_link& which, const std::string& own_pool) {
     using role = bridging::bridge_link::role;
     switch (which.what) {
@@ -86,7 +88,7 @@ void pool_link::pause(bool stop) {
 void pool_link::finish() {
     if (!closed_ && !std::exchange(finishing_, true)) {
         flush();
-        inbox_.clear();
+        clear_inbox();
         lost_ = true;
         schedule();
     }
@@ -98,9 +100,14 @@ void pool_link::close() {
     }
 }
 
+void pool_link::clear_inbox() {
+    inbox_.clear();
+    inbox_bytes_ = 0;
+}
+
 void pool_link::end() {
     const auto keep = shared_from_this();
-    inbox_.clear();
+    clear_inbox();
     owner_.reset();
     if (const auto by = by_.lock()) {
         by->on_closed(*this);
@@ -111,6 +118,7 @@ void pool_link::end() {
 
 void pool_link::deliver(std::string line) {
     if (!closed_ && !finishing_ && !lost_) {
+        inbox_bytes_ += memory_of(line);
         inbox_.push_back(std::move(line));
         schedule();
     }
@@ -133,6 +141,7 @@ void pool_link::hand_over_lines(const std::shared_ptr<link_events>& owner) {
     for (int turn = lines_per_turn; turn > 0 && !closed_ && !paused_ && !inbox_.empty(); --turn) {
         const auto line = std::move(inbox_.front());
         inbox_.pop_front();
+        inbox_bytes_ -= memory_of(line);
         received_ += line.size() + 1;
         owner->on_line(line);
     }

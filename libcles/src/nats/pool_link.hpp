@@ -42,6 +42,8 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
   public:
     /// What may wait for NATS, on all links together, before links count as slow.
     static constexpr std::size_t capacity = 65'536;
+    /// Bytes that may wait for the node before it is full.
+    static constexpr std::size_t inbox_capacity = 1U << 20U;
 
     pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link which, std::string own_pool);
 
@@ -62,6 +64,8 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     [[nodiscard]] const bridging::bridge_link& which() const noexcept { return which_; }
     /// Queues a line for the node.
     void deliver(std::string line);
+    /// The node takes less than arrives: lines that it can do without are not to be delivered.
+    [[nodiscard]] bool is_full() const noexcept { return inbox_bytes_ > inbox_capacity; }
     /// The bindings are lost, once the node has received what was delivered before.
     void lose_bindings(std::string_view why);
     /// The same of the link.
@@ -77,6 +81,7 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     [[nodiscard]] std::size_t excess() const noexcept;
     void schedule();
     void hand_over_lines(const std::shared_ptr<link_events>& owner);
+    void clear_inbox();
     void end();
 
     std::weak_ptr<pool_link_owner> by_;
@@ -85,6 +90,7 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     std::shared_ptr<link_events> owner_;
     std::string output_;
     std::deque<std::string> inbox_;
+    std::size_t inbox_bytes_ = 0;
     std::optional<std::string> bindings_lost_; // why
     bool lost_ = false;
     std::uint64_t flushed_ = 0;
