@@ -16,13 +16,19 @@ using role = cles::bridging::bridge_link::role;
 
 class recorded_owner final : public cles::nats::pool_link_owner {
   public:
-    void on_line(const cles::bridging::bridge_link&, std::string_view line) override { waiting += line.size() + 1; }
+    void on_line(const cles::bridging::bridge_link&, std::string_view line) override { give(line.size() + 1); }
     void schedule(std::shared_ptr<pool_link> which) override { ready.push_back(std::move(which)); }
     void on_flushed() override {}
     void on_closed(pool_link&) override {}
     [[nodiscard]] std::size_t unsent() const override { return waiting; }
+    [[nodiscard]] std::uint64_t given() const override { return all; }
+    void give(std::size_t bytes) {
+        waiting += bytes;
+        all += bytes;
+    }
 
     std::size_t waiting = 0;
+    std::uint64_t all = 0;
     std::vector<std::shared_ptr<pool_link>> ready;
 };
 
@@ -75,6 +81,35 @@ BOOST_FIXTURE_TEST_CASE(a_paused_link_says_when_enough_waits_for_the_node, fixtu
         BOOST_REQUIRE(node->lines > before);
     }
     BOOST_TEST(!link->is_full());
+}
+
+BOOST_FIXTURE_TEST_CASE(a_backlog_counts_on_the_links_that_have_written_it, fixture) {
+    const auto busy = make(role::from_pool);
+    const auto quiet = make(role::to_pool);
+    const auto write = [](const std::shared_ptr<pool_link>& on, std::size_t bytes) {
+        on->output().append(bytes - 1, 'x').push_back('\n');
+        on->flush();
+    };
+    write(quiet, 100);
+    write(busy, 300'000);
+    write(quiet, 100);
+    write(busy, 100'000);
+    BOOST_TEST(quiet->unsent() == 200U);
+    BOOST_TEST(busy->unsent() == 400'200U - pool_link::capacity);
+    BOOST_TEST(quiet->sent() == 0U);
+
+    owner->waiting -= 100; // the first line of `quiet`
+    BOOST_TEST(quiet->unsent() == 100U);
+    BOOST_TEST(quiet->sent() == 100U);
+    owner->waiting -= 300'050; // all of the second, and half of the third
+    BOOST_TEST(quiet->unsent() == 50U);
+    owner->waiting -= 50;
+    BOOST_TEST(quiet->unsent() == 0U);
+    BOOST_TEST(quiet->sent() == 200U);
+    BOOST_TEST(busy->unsent() == 100'000U - pool_link::capacity);
+    owner->waiting = 0;
+    BOOST_TEST(busy->unsent() == 0U);
+    BOOST_TEST(busy->sent() == 400'000U);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

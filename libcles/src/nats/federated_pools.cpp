@@ -518,6 +518,7 @@ void federated_pools::on_closed(pool_link& which) {
 }
 
 std::size_t federated_pools::unsent() const { return connection_ ? connection_->unsent() : 0; }
+std::uint64_t federated_pools::given() const { return connection_ ? connection_->given() : 0; }
 
 void federated_pools::write_metrics(json_writer& w) const {
     w.begin_object();

@@ -86,6 +86,7 @@ class federated_pools final : public core::other_pools,
     void on_flushed() override;
     void on_closed(pool_link& which) override;
     [[nodiscard]] std::size_t unsent() const override;
+    [[nodiscard]] std::uint64_t given() const override;
 
     void on_wake();
     void take_events();

@@ -171,6 +171,7 @@ void nats_connection::stop() noexcept {
 
 void nats_connection::enqueue(command c) {
     const auto size = c.size();
+    given_ += size;
     const std::lock_guard lock{mutex_};
     commands_.push_back(std::move(c));
     queued_ += size;

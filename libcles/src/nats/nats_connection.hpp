@@ -74,6 +74,8 @@ class nats_connection {
     std::vector<event> take();
     /// Bytes that the server has not been sent yet.
     [[nodiscard]] std::size_t unsent() const noexcept { return queued_.load() + buffered_.load(); }
+    /// Bytes that were given to it, ever. They are sent in this order.
+    [[nodiscard]] std::uint64_t given() const noexcept { return given_; }
     /// Messages of subscriptions that were dropped.
     [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(); }
     /// Sends what waits, and ends. `wake` is not called any more.
@@ -112,6 +114,7 @@ class nats_connection {
     const server_options options_;
     const std::uintptr_t number_; // in the registry of those that the library may call
     int wake_descriptor_;
+    std::uint64_t given_ = 0; // of the executor
 
     std::mutex mutex_; // guards what follows
     std::function<void()> wake_;
