@@ -347,6 +347,7 @@ void federated_pools::on_event(const event& e) {
     case event::kind::connected: {
         log(log_level::info, "connected to NATS, as a bridge of the pool '" + options_.pool + "'");
         last_problem_.clear();
+        connection_->use(e.connection);
         std::random_device random;
         bridge_->on_connected((std::uint64_t{random()} << 32U) | random(), e.max_message, now());
         break;
