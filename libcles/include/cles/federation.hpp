@@ -34,8 +34,10 @@ struct federation_options {
 };
 
 /// The bridge of one service, for `service_options::federation`. It starts one thread, which connects to NATS, and
-/// connects again whenever the connection is lost; the thread ends when the service is destroyed. The files are read at
-/// each connection. The service has to route (`cles::routing`) to serve requests of other pools for other nodes.
+/// connects again whenever the connection is lost; the thread ends when the service is destroyed, which waits for
+/// it: up to 200 ms for what is left to send, and while it connects, up to one second for each server and as long as
+/// the system takes to look up its name. The files are read at each connection. The service has to route
+/// (`cles::routing`) to serve requests of other pools for other nodes.
 /// It needs `service_options::insecure`: whoever may publish to NATS can send requests.
 ///
 /// \throws cles::error with `invalid_option` or `invalid_name`

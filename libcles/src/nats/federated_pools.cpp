@@ -5,6 +5,8 @@
 #include <cles/json_writer.hpp>
 
 #include "node/local_node.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
 
 #include <boost/asio/post.hpp>
 
@@ -218,10 +220,19 @@ void federated_pools::on_wake() {
     if (stopped_) {
         return;
     }
-    for (auto& each : connection_->take()) {
-        events_.push_back(std::move(each));
-    }
+    more_waits_ = true;
+    take_events();
     run();
+}
+
+// Only when those of the last time have been passed on: until then the thread keeps what it receives, and stops reading
+// when that is too much.
+void federated_pools::take_events() {
+    if (events_.empty() && std::exchange(more_waits_, false)) {
+        for (auto& each : connection_->take()) {
+            events_.push_back(std::move(each));
+        }
+    }
 }
 
 void federated_pools::run_later() {
@@ -253,7 +264,8 @@ void federated_pools::run() {
         return;
     }
     connection_->flush();
-    if (!events_.empty() || !ready_.empty()) {
+    take_events();
+    if (!events_.empty() || !ready_.empty() || !refused_.empty()) {
         run_later();
     }
     set_timer();
@@ -270,6 +282,7 @@ void federated_pools::run_batches() {
         serve_dials();
         hand_over_all();
         if (!stopped_) {
+            answer_refused();
             bridge_->on_batch();
         }
     }
@@ -335,6 +348,7 @@ void federated_pools::on_event(const event& e) {
     case event::kind::connected: {
         log(log_level::info, "connected to NATS, as a bridge of the pool '" + options_.pool + "'");
         last_problem_.clear();
+        connection_->use(e.connection);
         std::random_device random;
         bridge_->on_connected((std::uint64_t{random()} << 32U) | random(), e.max_message, now());
         break;
@@ -383,7 +397,38 @@ void federated_pools::deliver(const bridge_link& on, std::string line) {
             return;
         }
     }
-    found->second->deliver(std::move(line));
+    if (!found->second->is_full() || !refuse(on, line)) {
+        found->second->deliver(std::move(line));
+    }
+}
+
+// Returns false for what has to reach the node: cancellations, bindings, and replies to its own requests, which are as
+// many as the node has asked for.
+bool federated_pools::refuse(const bridge_link& on, std::string_view line) {
+    protocol::request_line r;
+    protocol::malformed_request wrong;
+    if (protocol::is_reply(line) || !protocol::parse_request(line, r, wrong)) {
+        return false;
+    }
+    if (on.what == bridge_link::role::to_pool) {
+        return r.is_update(); // shows as a gap
+    }
+    if (on.what != bridge_link::role::from_pool || r.noun.target == "self") {
+        return false;
+    }
+    refused_.emplace_back(on, r.id); // the bridge is not called from inside its own call
+    return true;
+}
+
+// As the node's replies, before the bridge acknowledges the requests of this batch.
+void federated_pools::answer_refused() {
+    for (const auto& [on, id] : std::exchange(refused_, {})) {
+        auto reply = "id=" + std::to_string(id) + " ";
+        protocol::append_failure(reply, {.code = errc::busy,
+                                         .message = "too many requests of other pools wait at this bridge",
+                                         .retry_ms = protocol::default_retry_ms});
+        bridge_->on_line(on, reply, now());
+    }
 }
 
 template <class Condition>
@@ -475,6 +520,7 @@ void federated_pools::on_closed(pool_link& which) {
 }
 
 std::size_t federated_pools::unsent() const { return connection_ ? connection_->unsent() : 0; }
+std::uint64_t federated_pools::given() const { return connection_ ? connection_->given() : 0; }
 
 void federated_pools::write_metrics(json_writer& w) const {
     w.begin_object();

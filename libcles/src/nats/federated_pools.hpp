@@ -86,13 +86,17 @@ class federated_pools final : public core::other_pools,
     void on_flushed() override;
     void on_closed(pool_link& which) override;
     [[nodiscard]] std::size_t unsent() const override;
+    [[nodiscard]] std::uint64_t given() const override;
 
     void on_wake();
+    void take_events();
     void on_event(const event& e);
     void run_later();
     void run();
     void run_batches();
     void hand_over_all();
+    bool refuse(const bridging::bridge_link& on, std::string_view line);
+    void answer_refused();
     void stop_if_finished();
     std::shared_ptr<pool_link> make_link(bridging::bridge_link which);
     template <class Condition>
@@ -115,6 +119,7 @@ class federated_pools final : public core::other_pools,
     std::map<bridging::bridge_link, std::shared_ptr<pool_link>> links_;
     std::deque<std::shared_ptr<pool_link>> ready_; // have something for the node
     std::deque<event> events_;
+    std::vector<std::pair<bridging::bridge_link, std::uint64_t>> refused_; // requests of other pools, by id
     std::list<waiting_dial> dials_;
     std::string last_problem_; // that was logged
     std::uint32_t last_link_ = 0;
@@ -125,6 +130,7 @@ class federated_pools final : public core::other_pools,
     bool run_posted_ = false;
     bool running_ = false;
     bool was_slow_ = false;
+    bool more_waits_ = false; // at the thread
 };
 
 } // namespace cles::nats

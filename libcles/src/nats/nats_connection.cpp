@@ -171,6 +171,8 @@ void nats_connection::stop() noexcept {
 
 void nats_connection::enqueue(command c) {
     const auto size = c.size();
+    given_ += size;
+    c.connection = used_;
     const std::lock_guard lock{mutex_};
     commands_.push_back(std::move(c));
     queued_ += size;
@@ -357,7 +359,8 @@ std::string nats_connection::connect() {
         return why;
     }
     event connected{.what = event::kind::connected,
-                    .max_message = static_cast<std::size_t>(natsConnection_GetMaxPayload(connection_))};
+                    .max_message = static_cast<std::size_t>(natsConnection_GetMaxPayload(connection_)),
+                    .connection = ++connection_number_};
     const std::lock_guard lock{mutex_};
     commands_.clear(); // from before
     queued_ = 0;
@@ -435,6 +438,9 @@ bool nats_connection::apply_commands() {
 }
 
 void nats_connection::apply(const command& c) {
+    if (c.connection != connection_number_) { // the executor has not noticed yet that this is another one
+        return;
+    }
     auto* const self = reinterpret_cast<void*>(number_); // NOLINT(performance-no-int-to-ptr): found in the registry
     const auto* const group = c.reply.empty() ? nullptr : c.reply.c_str();
     natsSubscription* made = nullptr;

@@ -33,7 +33,7 @@ struct server_options {
 /// What has happened, in order.
 struct event {
     enum class kind : std::uint8_t {
-        connected,    ///< `max_message` is set
+        connected,    ///< `max_message` and `connection` are set
         disconnected, ///< `text`: why
         refused,      ///< an attempt to connect failed; `text`: why
         problem,      ///< `text`: what the server does not permit
@@ -44,10 +44,11 @@ struct event {
     std::string reply{};
     std::string text{};
     std::size_t max_message = 0;
+    std::uint64_t connection = 0; ///< its number
 };
 
 /// A connection to NATS on a thread of its own, which connects again whenever the connection is lost, after growing
-/// pauses. Each connection begins without subscriptions, and what was not sent on the last one is dropped: nothing is
+/// pauses. Each connection begins without subscriptions, and what was meant for an earlier one is dropped: nothing is
 /// sent twice.
 ///
 /// Its functions are called on one thread, the executor's, and do not block; the destructor waits for the thread, at
@@ -55,7 +56,7 @@ struct event {
 class nats_connection {
   public:
     static constexpr std::size_t max_unsent = 4U << 20U;
-    static constexpr std::size_t max_untaken = 8U << 20U;
+    static constexpr std::size_t max_untaken = 4U << 20U;
 
     /// \param wake called on another thread when there are events, until `stop`
     nats_connection(server_options options, std::function<void()> wake);
@@ -63,6 +64,8 @@ class nats_connection {
     nats_connection& operator=(const nats_connection&) = delete;
     ~nats_connection();
 
+    /// The executor has noticed this connection: what follows is meant for it.
+    void use(std::uint64_t connection) noexcept { used_ = connection; }
     /// Returns false if too much waits to be sent.
     bool publish(std::string subject, std::string reply, std::string text);
     /// \param group the queue group; empty: none \param bulk messages that may be dropped if too many wait to be taken
@@ -74,6 +77,8 @@ class nats_connection {
     std::vector<event> take();
     /// Bytes that the server has not been sent yet.
     [[nodiscard]] std::size_t unsent() const noexcept { return queued_.load() + buffered_.load(); }
+    /// Bytes that were given to it, ever. They are sent in this order.
+    [[nodiscard]] std::uint64_t given() const noexcept { return given_; }
     /// Messages of subscriptions that were dropped.
     [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(); }
     /// Sends what waits, and ends. `wake` is not called any more.
@@ -86,6 +91,7 @@ class nats_connection {
         std::string subject;
         std::string reply{}; // or the queue group
         std::string text{};
+        std::uint64_t connection = 0; // for which it is meant
 
         [[nodiscard]] std::size_t size() const noexcept { return subject.size() + reply.size() + text.size() + 16; }
     };
@@ -113,6 +119,10 @@ class nats_connection {
     const std::uintptr_t number_; // in the registry of those that the library may call
     int wake_descriptor_;
 
+    // Of the executor.
+    std::uint64_t given_ = 0;
+    std::uint64_t used_ = 0; // connection
+
     std::mutex mutex_; // guards what follows
     std::function<void()> wake_;
     std::vector<command> commands_;
@@ -132,6 +142,7 @@ class nats_connection {
 
     // Of the thread.
     __natsConnection* connection_ = nullptr;
+    std::uint64_t connection_number_ = 0;
     std::map<std::string, __natsSubscription*, std::less<>> subscriptions_;
     std::vector<__natsSubscription*> polled_;
 

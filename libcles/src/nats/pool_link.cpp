@@ -11,6 +11,8 @@ namespace {
 
 constexpr int lines_per_turn = 1024;
 
+std::size_t memory_of(const std::string& line) { return line.size() + sizeof line; }
+
 std::string address_of(const bridging::bridge_link& which, const std::string& own_pool) {
     using role = bridging::bridge_link::role;
     switch (which.what) {
@@ -30,10 +32,45 @@ pool_link::pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link wh
                                                           .uid = {},
                                                           .local = false} {}
 
+// Of what waits for NATS, the part that this link has written.
+std::size_t pool_link::waiting() const noexcept {
+    const auto by = by_.lock();
+    if (!by || closed_ || given_.empty()) {
+        return 0;
+    }
+    const auto given = by->given();
+    const auto sent = given - std::min<std::uint64_t>(given, by->unsent());
+    const auto first = std::ranges::upper_bound(given_, sent, {}, &given_bytes::end);
+    return first == given_.end() ? 0 : given_total_ - first->total + std::min(first->size, first->end - sent);
+}
+
+// Another link's backlog is not this one's: it would count as one whose peer reads nothing.
 std::size_t pool_link::excess() const noexcept {
     const auto by = by_.lock();
-    const auto waiting = by && !closed_ ? by->unsent() : 0;
-    return waiting > capacity ? waiting - capacity : 0;
+    const auto all = by && !closed_ ? by->unsent() : 0;
+    return all > capacity ? std::min(all - capacity, waiting()) : 0;
+}
+
+void pool_link::note_given(std::uint64_t before) {
+    const auto by = by_.lock();
+    if (!by) {
+        return;
+    }
+    const auto end = by->given();
+    const auto sent = end - std::min<std::uint64_t>(end, by->unsent());
+    while (!given_.empty() && given_.front().end <= sent) {
+        given_.pop_front();
+    }
+    const auto size = end - before;
+    if (size == 0) {
+        return;
+    }
+    given_total_ += size;
+    if (!given_.empty() && given_.back().end == before) {
+        given_.back() = {.end = end, .total = given_total_, .size = given_.back().size + size};
+    } else {
+        given_.push_back({.end = end, .total = given_total_, .size = size});
+    }
 }
 
 std::uint64_t pool_link::sent() const noexcept { return flushed_ - std::min<std::uint64_t>(flushed_, excess()); }
@@ -61,12 +98,14 @@ void pool_link::flush() {
     if (!by || lost_) {
         return;
     }
+    const auto before = by->given();
     for (std::string_view left = text; !left.empty() && !closed_;) {
         const auto end = std::min(left.find('\n'), left.size());
         by->on_line(which_, left.substr(0, end));
         left.remove_prefix(std::min(end + 1, left.size()));
     }
-    was_full_ = was_full_ || excess() != 0;
+    note_given(before);
+    was_full_ = was_full_ || waiting() != 0;
     by->on_flushed();
 }
 
@@ -86,7 +125,7 @@ void pool_link::pause(bool stop) {
 void pool_link::finish() {
     if (!closed_ && !std::exchange(finishing_, true)) {
         flush();
-        inbox_.clear();
+        clear_inbox();
         lost_ = true;
         schedule();
     }
@@ -98,9 +137,14 @@ void pool_link::close() {
     }
 }
 
+void pool_link::clear_inbox() {
+    inbox_.clear();
+    inbox_bytes_ = 0;
+}
+
 void pool_link::end() {
     const auto keep = shared_from_this();
-    inbox_.clear();
+    clear_inbox();
     owner_.reset();
     if (const auto by = by_.lock()) {
         by->on_closed(*this);
@@ -111,6 +155,7 @@ void pool_link::end() {
 
 void pool_link::deliver(std::string line) {
     if (!closed_ && !finishing_ && !lost_) {
+        inbox_bytes_ += memory_of(line);
         inbox_.push_back(std::move(line));
         schedule();
     }
@@ -133,6 +178,7 @@ void pool_link::hand_over_lines(const std::shared_ptr<link_events>& owner) {
     for (int turn = lines_per_turn; turn > 0 && !closed_ && !paused_ && !inbox_.empty(); --turn) {
         const auto line = std::move(inbox_.front());
         inbox_.pop_front();
+        inbox_bytes_ -= memory_of(line);
         received_ += line.size() + 1;
         owner->on_line(line);
     }

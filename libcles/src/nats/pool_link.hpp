@@ -32,6 +32,8 @@ class pool_link_owner {
     virtual void on_closed(pool_link& which) = 0;
     /// Bytes that wait to be sent to NATS, on all links together.
     [[nodiscard]] virtual std::size_t unsent() const = 0;
+    /// Bytes that were given to NATS to be sent, ever, on all links together; sent in this order.
+    [[nodiscard]] virtual std::uint64_t given() const = 0;
 
   protected:
     ~pool_link_owner() = default;
@@ -42,6 +44,8 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
   public:
     /// What may wait for NATS, on all links together, before links count as slow.
     static constexpr std::size_t capacity = 65'536;
+    /// Bytes that may wait for the node before it is full.
+    static constexpr std::size_t inbox_capacity = 1U << 20U;
 
     pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link which, std::string own_pool);
 
@@ -62,6 +66,8 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     [[nodiscard]] const bridging::bridge_link& which() const noexcept { return which_; }
     /// Queues a line for the node.
     void deliver(std::string line);
+    /// The node takes less than arrives: lines that it can do without are not to be delivered.
+    [[nodiscard]] bool is_full() const noexcept { return inbox_bytes_ > inbox_capacity; }
     /// The bindings are lost, once the node has received what was delivered before.
     void lose_bindings(std::string_view why);
     /// The same of the link.
@@ -74,9 +80,19 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     void on_writable();
 
   private:
+    // Bytes that were given to NATS for this link without a break, up to a position in all that was given.
+    struct given_bytes {
+        std::uint64_t end;
+        std::uint64_t total; // of the link, with these
+        std::uint64_t size;
+    };
+
+    [[nodiscard]] std::size_t waiting() const noexcept;
     [[nodiscard]] std::size_t excess() const noexcept;
+    void note_given(std::uint64_t before);
     void schedule();
     void hand_over_lines(const std::shared_ptr<link_events>& owner);
+    void clear_inbox();
     void end();
 
     std::weak_ptr<pool_link_owner> by_;
@@ -85,8 +101,11 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     std::shared_ptr<link_events> owner_;
     std::string output_;
     std::deque<std::string> inbox_;
+    std::size_t inbox_bytes_ = 0;
     std::optional<std::string> bindings_lost_; // why
     bool lost_ = false;
+    std::deque<given_bytes> given_; // that may not be sent yet
+    std::uint64_t given_total_ = 0;
     std::uint64_t flushed_ = 0;
     std::uint64_t received_ = 0;
     bool paused_ = false;
