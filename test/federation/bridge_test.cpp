@@ -315,6 +315,25 @@ BOOST_FIXTURE_TEST_CASE(foreign_messages_are_dropped_and_logged_once, two_pools)
     BOOST_TEST(gate.core().is_live("south"));
 }
 
+BOOST_FIXTURE_TEST_CASE(a_message_with_a_line_feed_does_not_reach_the_node, two_pools) {
+    gate.answer_after = 1s;
+    const auto id = hub.ask("north", "DELEGATE car9:echo {\"n\":1}");
+    nats.run_for(10ms);
+    nats.publish("cles.south.bridge." + hub.core().self().instance + ".1", "", "{\"value\":\n12}");
+    nats.run_for(10ms);
+    BOOST_TEST(hub.answer(id) == R"({"error":"failed","message":"the reply that came through NATS is not one line"})");
+    BOOST_TEST(count(gate.cancelled, "{\"n\":1}") == 1U);
+    hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    nats.publish("cles.north.feed.car9.speed", "", " seq=1 epoch=5f3a09c1 {\"n\":\n1}");
+    nats.publish("cles.north.push.car9.echo", "_INBOX.x", "{\"n\":\n2}");
+    nats.run_for(10ms);
+    BOOST_TEST(hub.updates.empty());
+    BOOST_TEST(has_words(nats.recorded("_INBOX.x"), "bad_request"));
+    BOOST_TEST(hub.core().counted().messages_refused == 2U);
+    BOOST_TEST(gate.core().counted().messages_refused == 1U);
+}
+
 BOOST_FIXTURE_TEST_CASE(what_is_too_long_is_refused, two_pools) {
     const auto id = hub.ask("north", "PUSH car9:echo {\"n\":\"" + std::string(70'000, 'x') + "\"}");
     nats.run_for(10ms);

@@ -160,6 +160,17 @@ void bridge::on_message(std::string_view where, std::string_view reply, std::str
         }
         return;
     }
+    if (message.find('\n') != std::string_view::npos) { // would end a line of the node's links
+        constexpr std::string_view why = "a message of NATS holds one line";
+        drop(where, why);
+        if (about.kind == subject_kind::request) {
+            refuse_foreign(std::string{reply}, {.code = errc::bad_request, .message = std::string{why}});
+        } else if (about.kind == subject_kind::reply) {
+            sent_.on_unusable(about.number, message,
+                              {.code = errc::failed, .message = "the reply that came through NATS is not one line"});
+        }
+        return;
+    }
     switch (about.kind) {
     case subject_kind::request: take(about, reply, message, false); break;
     case subject_kind::feed:
@@ -280,7 +291,7 @@ void bridge::on_control(std::string_view reply, std::string_view message, time_p
     protocol::request_line r;
     protocol::malformed_request wrong;
     if ((from.kind != subject_kind::control && from.kind != subject_kind::reply) ||
-        message.find('\n') != message.npos || !protocol::parse_request(message, r, wrong)) {
+        !protocol::parse_request(message, r, wrong)) {
         drop(control_subject(self_), "it is not a message of a bridge");
         return;
     }
@@ -560,9 +571,7 @@ void bridge::take(const subject& about, std::string_view reply, std::string_view
     const auto text = text_of(about.verb, about.node, about.task, message);
     protocol::request_line r;
     protocol::malformed_request wrong;
-    if (text.find('\n') != std::string::npos) {
-        wrong.why = "a message of NATS holds one line";
-    } else if (protocol::parse_request(text, r, wrong) && r.is_update()) {
+    if (protocol::parse_request(text, r, wrong) && r.is_update()) {
         wrong.why = "an update with 'seq' and 'epoch' is not a request";
     }
     if (!wrong.why.empty()) {

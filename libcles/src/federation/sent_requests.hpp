@@ -5,6 +5,7 @@
 
 #include "federation/bridge_link.hpp"
 #include "federation/subject.hpp"
+#include "protocol/reply_line.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -45,6 +46,8 @@ class sent_requests {
     std::uint64_t add(const bridge_link& from, std::uint64_t id, time_point due, time_point now);
     /// A message for that number from the pool.
     void on_message(std::uint64_t number, std::string_view message);
+    /// The pool has answered, but the message cannot be passed on: the request fails.
+    void on_unusable(std::uint64_t number, std::string_view message, const protocol::failure& why);
     /// The node has cancelled it. A bridge that has not acknowledged it yet is told when it does.
     void cancel(std::uint64_t id);
     /// What that bridge took is not answered any more.
@@ -72,7 +75,7 @@ class sent_requests {
 
     void on_taken(requests::iterator which, std::string_view taker);
     requests::iterator erase(requests::iterator which);
-    void fail(requests::iterator which, std::string_view why);
+    void fail(requests::iterator which, const protocol::failure& why);
     template <class Condition>
     void cancel_if(Condition concerns);
 
