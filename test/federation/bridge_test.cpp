@@ -351,6 +351,33 @@ BOOST_FIXTURE_TEST_CASE(what_is_too_long_is_refused, two_pools) {
     BOOST_TEST(hub.answer(late).find(R"("ran":true)") != std::string::npos);
 }
 
+BOOST_FIXTURE_TEST_CASE(a_reply_for_which_there_is_no_room_is_a_failure, two_pools) {
+    gate.answer_after = 50ms;
+    const auto id = hub.ask("north", "PUSH car9:echo {\"n\":1}");
+    const auto refused = hub.ask("north", "PUSH car9:echo {\"n\":2}");
+    nats.run_for(10ms);
+    gate.is_full = true;
+    gate.core().on_line({bridge_link::role::from_pool, "south"}, R"(id=2 {"error":"new","x":1})", nats.now());
+    nats.run_for(2s);
+    BOOST_TEST(hub.answer(id).starts_with(R"({"error":"busy")"));
+    BOOST_TEST(hub.answer(id).find(R"("ran":true)") != std::string::npos);
+    BOOST_TEST(hub.answer(refused) == R"({"error":"new","x":1})");
+    BOOST_TEST(hub.core().is_live("north"));
+    const auto bind = hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    BOOST_TEST(hub.answer(bind) == "{}");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_reply_that_is_too_long_here_fails_the_request, two_pools) {
+    gate.answer_after = 1s;
+    const auto id = hub.ask("north", "PUSH car9:echo {\"n\":1}");
+    nats.run_for(10ms);
+    nats.publish("cles.south.bridge." + hub.core().self().instance + ".1", "", std::string(70'000, 'x'));
+    nats.run_for(10ms);
+    BOOST_TEST(hub.answer(id).starts_with(R"({"error":"too_large")"));
+    BOOST_TEST(hub.answer(id).find(R"("ran":true)") != std::string::npos);
+}
+
 BOOST_FIXTURE_TEST_CASE(the_link_answers_what_the_node_asks_itself, two_pools) {
     const auto id = hub.ask("north", "PULL self:cles");
     BOOST_TEST(hub.answer(id) == R"({"pool":"north","protocol":1,"features":["mark"]})");

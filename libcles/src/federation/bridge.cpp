@@ -24,6 +24,7 @@ constexpr std::chrono::minutes between_drop_logs{1};
 constexpr std::uint32_t upstream_keep = 1024;
 constexpr std::chrono::seconds remembered_for{10}; // after a bridge is lost, or before it is known
 constexpr std::size_t max_strange = 1024;
+constexpr std::size_t max_short = 1024; // of a failure for which room is reserved
 
 constexpr std::string_view cancel_path = "cles/cancel/";
 constexpr std::string_view lost_line = "PUSH self:cles/lost";
@@ -157,6 +158,12 @@ void bridge::on_message(std::string_view where, std::string_view reply, std::str
             refuse_foreign(std::string{reply},
                            {.code = errc::too_large,
                             .message = "a request has at most " + std::to_string(max_message_) + " bytes here"});
+        } else if (about.kind == subject_kind::reply) {
+            sent_.on_unusable(about.number, message,
+                              {.code = errc::too_large,
+                               .message = "the reply has " + std::to_string(message.size()) + " bytes; at most " +
+                                          std::to_string(max_message_) + " are read here",
+                               .ran = true});
         }
         return;
     }
@@ -208,7 +215,7 @@ void bridge::send_heartbeat(bool starting) {
         pools_.on_heartbeat(self_, said, now_); // so that `publisher_of` considers it
     }
     heartbeat_sent_ = now_;
-    out_.publish(heartbeat_subject(self_), {}, text_of(said));
+    publish_short(heartbeat_subject(self_), text_of(said));
 }
 
 void bridge::on_heartbeat(const subject& from, std::string_view message, time_point now) {
@@ -265,7 +272,7 @@ void bridge::send_names() {
         out_.log(log_level::warning, "the names of the pool's nodes do not fit into a message of NATS");
         return;
     }
-    out_.publish(names_subject(self_), {}, std::move(text));
+    publish(names_subject(self_), std::move(text));
 }
 
 void bridge::on_names(const subject& from, std::string_view message) {
@@ -282,7 +289,7 @@ void bridge::on_names(const subject& from, std::string_view message) {
 }
 
 void bridge::send_control(const bridge_id& to, std::string line) {
-    out_.publish(control_subject(to), control_subject(self_), std::move(line));
+    out_.publish(control_subject(to), control_subject(self_), std::move(line), bridge_output::room::reserved);
 }
 
 void bridge::on_control(std::string_view reply, std::string_view message, time_point now) {
@@ -482,7 +489,7 @@ void bridge::publish_request(const bridge_link& from, const protocol::request_li
     }
     ++figures_.requests_sent;
     if (!out_.publish(request_subject(pool, r.verb, without_pool(r.noun.target, pool), r.noun.task),
-                      reply_subject(self_, number), std::move(message))) {
+                      reply_subject(self_, number), std::move(message), bridge_output::room::shared)) {
         sent_.on_message(number, failure_text({.code = errc::busy,
                                                .message = "too much waits to be sent to NATS",
                                                .retry_ms = protocol::default_retry_ms}));
@@ -555,14 +562,22 @@ void bridge::on_answer(const bridge_link& on, std::uint64_t id, std::string_view
 
 void bridge::cancel_at(const bridge_id& taker, std::uint64_t number) {
     out_.publish(control_subject(taker), reply_subject(self_, number),
-                 "PUSH self:" + std::string{cancel_path} + std::to_string(number));
+                 "PUSH self:" + std::string{cancel_path} + std::to_string(number), bridge_output::room::reserved);
 }
 
 // -- requests of other pools ---------------------------------------------------------------------------------------
 
+bool bridge::publish(std::string subject, std::string message) {
+    return out_.publish(std::move(subject), {}, std::move(message), bridge_output::room::shared);
+}
+
+void bridge::publish_short(std::string subject, std::string message) {
+    out_.publish(std::move(subject), {}, std::move(message), bridge_output::room::reserved);
+}
+
 void bridge::refuse_foreign(const std::string& reply, const protocol::failure& why) {
     if (!reply.empty()) {
-        out_.publish(reply, {}, failure_text(why));
+        publish_short(reply, failure_text(why));
     }
 }
 
@@ -637,7 +652,7 @@ bool bridge::remember(const bridge_id& by) {
 void bridge::on_batch() {
     for (const auto* open : taken_.take_unacknowledged()) {
         if (!open->reply.empty()) {
-            out_.publish(open->reply, {}, taken_text(self_.instance));
+            publish_short(open->reply, taken_text(self_.instance));
         }
     }
 }
@@ -657,7 +672,14 @@ void bridge::send_reply(std::string_view line) {
     }
     if (!r->reply.empty()) {
         if (parts.rest.size() <= max_message_) {
-            out_.publish(r->reply, {}, std::string{parts.rest});
+            if (is_error_reply(parts.rest) && parts.rest.size() <= max_short) {
+                publish_short(r->reply, std::string{parts.rest});
+            } else if (!publish(r->reply, std::string{parts.rest}) && !parts.is_interim) {
+                refuse_foreign(r->reply, {.code = errc::busy,
+                                          .message = "too much waits to be sent to NATS for the reply",
+                                          .retry_ms = protocol::default_retry_ms,
+                                          .ran = true});
+            }
         } else if (!parts.is_interim) {
             refuse_foreign(r->reply, {.code = errc::too_large,
                                       .message = "the reply has " + std::to_string(parts.rest.size()) +
@@ -688,11 +710,11 @@ void bridge::take_bind(const protocol::request_line& r, const taken_requests::re
     const auto publisher = pools_.publisher_of(setup_.pool, noun);
     if (!is_passed_on && publisher != self_.instance && !publisher.empty()) {
         out_.publish(control_subject({setup_.pool, std::string{publisher}}), by.reply,
-                     text_of(verb::bind, r.noun.target, r.noun.task, message_of(r, {})));
+                     text_of(verb::bind, r.noun.target, r.noun.task, message_of(r, {})), bridge_output::room::reserved);
         return;
     }
     ++figures_.requests_taken;
-    out_.publish(by.reply, {}, taken_text(self_.instance));
+    publish_short(by.reply, taken_text(self_.instance));
     if (const auto id = published_.bind(noun, {by.by, by.reply}); id != 0) {
         std::string line = "BIND " + noun + " id=" + std::to_string(id) + " deadline=" + std::to_string(r.deadline_ms) +
                            " keep=" + std::to_string(upstream_keep) + " mark=yes hops=" + std::to_string(r.hops);
@@ -710,10 +732,11 @@ void bridge::send_bind_reply(std::string_view line) {
     }
     const auto answered = published_.on_reply(parts.id, is_error_reply(parts.rest));
     for (const auto& to : answered.to) {
-        if (parts.rest.size() + max_pool_name <= max_message_) {
-            out_.publish(to, {}, taken_text(self_.instance) + " " + std::string{parts.rest});
-        } else { // it is bound nevertheless, without a value
-            out_.publish(to, {}, taken_text(self_.instance) + " {}");
+        const auto taken = taken_text(self_.instance) + " ";
+        if (is_error_reply(parts.rest) && parts.rest.size() <= max_short) {
+            publish_short(to, taken + std::string{parts.rest});
+        } else if (parts.rest.size() + max_pool_name > max_message_ || !publish(to, taken + std::string{parts.rest})) {
+            publish_short(to, taken + "{}"); // it is bound nevertheless, without a value
         }
     }
     if (answered.ends) {
@@ -736,7 +759,7 @@ void bridge::send_update(std::string_view line) {
         return;
     }
     ++figures_.updates_sent;
-    out_.publish(feed_subject(setup_.pool, noun.substr(0, colon), task), {}, std::move(message));
+    publish(feed_subject(setup_.pool, noun.substr(0, colon), task), std::move(message));
 }
 
 void bridge::end_published(const std::string& noun) {

@@ -34,8 +34,12 @@ class bridge_output {
     bridge_output(const bridge_output&) = delete;
     bridge_output& operator=(const bridge_output&) = delete;
 
+    enum class room : std::uint8_t {
+        shared,  ///< of requests, replies and updates
+        reserved ///< for short messages without which others would wait in vain: failures, control, heartbeats
+    };
     /// Returns false if too much waits already.
-    virtual bool publish(std::string subject, std::string reply, std::string message) = 0;
+    virtual bool publish(std::string subject, std::string reply, std::string message, room in) = 0;
     /// \param shared one bridge of the pool receives each message
     virtual void subscribe(std::string subject, bool shared) = 0;
     virtual void unsubscribe(const std::string& subject) = 0;
@@ -134,6 +138,8 @@ class bridge final : private sent_requests_events {
     void send_update(std::string_view line);
     void cancel_taken(std::uint64_t id);
     void end_published(const std::string& noun);
+    bool publish(std::string subject, std::string message);
+    void publish_short(std::string subject, std::string message);
     void refuse_foreign(const std::string& reply, const protocol::failure& why);
     void drop(std::string_view where, std::string_view why);
     bool remember(const bridge_id& by);

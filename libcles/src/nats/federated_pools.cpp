@@ -20,6 +20,7 @@ namespace {
 
 constexpr std::size_t events_per_batch = 256;
 constexpr int batches_per_turn = 8;
+constexpr std::size_t reserved_room = 512U << 10U; // of what may wait for NATS, for short messages
 constexpr std::chrono::milliseconds pool_appears_within{2'000};
 
 class dial_errors final : public boost::system::error_category {
@@ -350,8 +351,9 @@ void federated_pools::on_event(const event& e) {
 
 // -- for the bridge ------------------------------------------------------------------------------------------------
 
-bool federated_pools::publish(std::string subject, std::string reply, std::string message) {
-    return connection_ && connection_->publish(std::move(subject), std::move(reply), std::move(message));
+bool federated_pools::publish(std::string subject, std::string reply, std::string message, room in) {
+    const bool has_room = in == room::reserved || unsent() + reserved_room <= nats_connection::max_unsent;
+    return connection_ && has_room && connection_->publish(std::move(subject), std::move(reply), std::move(message));
 }
 
 void federated_pools::subscribe(std::string subject, bool shared) {

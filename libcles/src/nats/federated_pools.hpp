@@ -69,7 +69,7 @@ class federated_pools final : public core::other_pools,
     };
 
     // bridging::bridge_output
-    bool publish(std::string subject, std::string reply, std::string message) override;
+    bool publish(std::string subject, std::string reply, std::string message, room in) override;
     void subscribe(std::string subject, bool shared) override;
     void unsubscribe(const std::string& subject) override;
     void deliver(const bridging::bridge_link& on, std::string line) override;
