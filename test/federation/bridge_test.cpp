@@ -537,6 +537,79 @@ BOOST_FIXTURE_TEST_CASE(a_binding_ended_before_its_reply_does_not_remain, two_po
     BOOST_TEST(!gate.bound.contains("car9:speed"));
 }
 
+// Holds back what comes from the pool north, and lets it pass later.
+struct slow_replies : two_pools {
+    std::vector<std::pair<std::string, std::string>> held;
+
+    slow_replies() {
+        nats.lose = [this](const std::string& subject, const std::string& message) {
+            const bool is_reply = subject.starts_with("cles.south.bridge") && !subject.ends_with("control");
+            if (is_reply) {
+                held.emplace_back(subject, message);
+            }
+            return is_reply;
+        };
+    }
+    void pass() {
+        nats.lose = nullptr;
+        for (const auto& [subject, message] : std::exchange(held, {})) {
+            nats.publish(subject, {}, message);
+        }
+        nats.run_for(10ms);
+    }
+};
+
+BOOST_FIXTURE_TEST_CASE(a_binding_that_is_cancelled_does_not_remain, slow_replies) {
+    const auto id = hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    hub.cancel("north", id);
+    BOOST_TEST(!hub.subscribes("cles.north.feed.car9.speed", false));
+    BOOST_TEST(gate.bound.contains("car9:speed"));
+    pass();
+    BOOST_TEST(!gate.bound.contains("car9:speed"));
+    BOOST_TEST(hub.answers[id].empty());
+}
+
+BOOST_FIXTURE_TEST_CASE(a_binding_of_a_link_that_is_closed_does_not_remain, slow_replies) {
+    hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    hub.core().on_closed({bridge_link::role::to_pool, "north", 1});
+    pass();
+    BOOST_TEST(!gate.bound.contains("car9:speed"));
+}
+
+BOOST_FIXTURE_TEST_CASE(a_binding_that_is_acknowledged_too_late_does_not_remain, slow_replies) {
+    const auto id = hub.ask("north", "BIND car9:speed deadline=60000");
+    nats.run_for(3s);
+    BOOST_TEST(hub.answer(id).starts_with(R"({"error":"unavailable")"));
+    pass();
+    BOOST_TEST(!gate.bound.contains("car9:speed"));
+}
+
+BOOST_FIXTURE_TEST_CASE(a_binding_whose_reply_is_lost_does_not_remain, slow_replies) {
+    hub.ask("north", "BIND car9:speed deadline=1000");
+    nats.run_for(10ms);
+    BOOST_REQUIRE(held.size() == 2U); // the acknowledgement and the reply
+    held.pop_back();
+    pass();
+    nats.run_for(3s);
+    BOOST_TEST(!gate.bound.contains("car9:speed"));
+    BOOST_TEST(!hub.subscribes("cles.north.feed.car9.speed", false));
+}
+
+BOOST_FIXTURE_TEST_CASE(another_binding_of_the_noun_survives_a_cancellation, two_pools) {
+    hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    nats.impair().longest_delay = 5ms;
+    const auto id = hub.ask("north", "BIND north.car9:speed");
+    hub.cancel("north", id);
+    nats.run_for(100ms);
+    BOOST_TEST(gate.bound.contains("car9:speed"));
+    gate.update("car9:speed", 1);
+    nats.run_for(10ms);
+    BOOST_TEST((hub.updates == std::vector<std::string>{"UPDATE car9:speed seq=1 epoch=5f3a09c1 {\"n\":1}"}));
+}
+
 // -- the pools -----------------------------------------------------------------------------------------------------
 
 BOOST_FIXTURE_TEST_CASE(two_sites_with_one_name_are_reported, two_pools) {

@@ -327,6 +327,8 @@ void bridge::on_control(std::string_view reply, std::string_view message, time_p
         const auto number = protocol::parse_number(r.noun.path.substr(cancel_path.size()));
         if (const auto id = number ? taken_.id_of(by, *number) : std::nullopt) {
             cancel_taken(*id);
+        } else if (const auto noun = published_.cancel({by, std::string{reply}})) {
+            end_published(*noun);
         }
     } else {
         drop(control_subject(self_), "it is not a message of a bridge");
@@ -349,6 +351,7 @@ void bridge::on_lost(const bridge_id& gone, std::string_view why) {
         for (const auto& each : feeds_.remove_pool(gone.pool)) {
             unsubscribe_if_last(each);
         }
+        std::erase_if(binds_, [&gone](const auto& each) { return each.second.pool == gone.pool; });
         out_.lose_pool(gone.pool, why);
     } else {
         sent_.on_lost(gone, why);
@@ -414,6 +417,9 @@ void bridge::on_closed(const bridge_link& which) {
     case bridge_link::role::to_pool:
         sent_.close(which);
         end_bindings(feeds_.remove_link(which));
+        std::erase_if(binds_, [&which](const auto& each) {
+            return each.second.pool == which.pool && each.second.link == which.number;
+        });
         break;
     case bridge_link::role::from_pool:
         for (const auto id : taken_.requests_of(which.pool)) {
@@ -450,8 +456,11 @@ void bridge::deliver(std::vector<foreign_feeds::update> updates) {
 void bridge::answer_for_itself(const bridge_link& from, const protocol::request_line& r) {
     if (r.verb == verb::push && r.noun.path.starts_with(cancel_path)) {
         const auto id = protocol::parse_number(r.noun.path.substr(cancel_path.size()));
-        if (id && !binds_.contains(*id)) { // a binding is ended when it is known who holds it
+        if (id) {
             sent_.cancel(*id);
+            if (auto gone = binds_.erase(*id) != 0 ? feeds_.remove(*id) : std::nullopt) {
+                end_bindings({std::move(*gone)});
+            }
         }
     } else if (r.verb == verb::pull && r.noun.path == "cles") {
         if (r.id != 0) {
@@ -558,6 +567,13 @@ void bridge::on_answer(const bridge_link& on, std::uint64_t id, std::string_view
         end_binding_at(std::string{taker}, bind.mapped());
     }
     deliver(feeds_.on_bound(id, taker));
+}
+
+void bridge::on_forgotten(std::uint64_t id) {
+    binds_.erase(id);
+    if (auto gone = feeds_.remove(id)) {
+        end_bindings({std::move(*gone)});
+    }
 }
 
 void bridge::cancel_at(const bridge_id& taker, std::uint64_t number) {

@@ -158,6 +158,7 @@ class bridge final : private sent_requests_events {
     // sent_requests_events
     void on_answer(const bridge_link& on, std::uint64_t id, std::string_view reply, std::string_view taker) override;
     void cancel_at(const bridge_id& taker, std::uint64_t number) override;
+    void on_forgotten(std::uint64_t id) override;
 
     const settings setup_;
     bridge_output& out_;

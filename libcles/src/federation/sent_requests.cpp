@@ -137,16 +137,24 @@ void sent_requests::on_lost(const bridge_id& taker, std::string_view why) {
 
 void sent_requests::on_time(time_point now) {
     std::vector<std::uint64_t> late;
-    for (auto at = sent_.begin(); at != sent_.end();) {
-        const auto& r = at->second;
-        if (r.forgotten_at <= now) { // the node has given up by itself
-            at = erase(at);
-            continue;
+    std::vector<std::uint64_t> over;
+    for (const auto& [number, r] : sent_) {
+        if (r.forgotten_at <= now) {
+            over.push_back(number);
+        } else if (r.taker.empty() && !r.is_cancelled && r.acknowledged_by <= now) {
+            late.push_back(number);
         }
-        if (r.taker.empty() && !r.is_cancelled && r.acknowledged_by <= now) {
-            late.push_back(at->first);
+    }
+    for (const auto number : over) {
+        const auto found = sent_.find(number);
+        const auto gone = std::move(found->second);
+        erase(found);
+        if (!gone.is_cancelled) { // the node has given up by itself
+            if (!gone.taker.empty()) {
+                events_.cancel_at({gone.from.pool, gone.taker}, number);
+            }
+            events_.on_forgotten(gone.id);
         }
-        ++at;
     }
     for (const auto number : late) {
         const auto found = sent_.find(number);

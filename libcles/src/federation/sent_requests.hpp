@@ -30,6 +30,8 @@ class sent_requests_events {
     virtual void on_answer(const bridge_link& on, std::uint64_t id, std::string_view reply, std::string_view taker) = 0;
     /// That bridge is to cancel the request.
     virtual void cancel_at(const bridge_id& taker, std::uint64_t number) = 0;
+    /// The node's request was not answered until long after its deadline.
+    virtual void on_forgotten(std::uint64_t id) = 0;
 
   protected:
     ~sent_requests_events() = default;
