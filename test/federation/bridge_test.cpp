@@ -201,9 +201,23 @@ BOOST_FIXTURE_TEST_CASE(what_a_lost_bridge_took_is_unavailable, two_pools) {
 
 BOOST_FIXTURE_TEST_CASE(the_last_bridge_of_a_pool_takes_the_link_with_it, two_pools) {
     gate.core().leave();
+    gate.core().say_left();
     nats.run_for(10ms);
     BOOST_TEST(!hub.core().is_live("north"));
     BOOST_TEST(count(hub.lost, "pool north") == 1U);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_bridge_that_leaves_completes_what_it_has_taken, two_pools) {
+    gate.answer_after = 5s;
+    const auto id = hub.ask("north", "DELEGATE car9:echo deadline=10000 {\"n\":1}");
+    nats.run_for(10ms);
+    gate.core().leave();
+    BOOST_TEST(!gate.subscribes("cles.north.push.car9.echo", true));
+    nats.run_for(6s);
+    BOOST_TEST(hub.answer(id) == "{\"n\":1}");
+    gate.core().say_left();
+    nats.run_for(10ms);
+    BOOST_TEST(!hub.core().is_live("north"));
 }
 
 BOOST_FIXTURE_TEST_CASE(requests_of_a_lost_bridge_are_cancelled, two_pools) {

@@ -99,6 +99,11 @@ void bridge::leave() {
         for (const auto how : {verb::pull, verb::push, verb::delegate, verb::bind, verb::update}) {
             out_.unsubscribe(request_filter(setup_.pool, how));
         }
+    }
+}
+
+void bridge::say_left() {
+    if (!std::exchange(left_, true) && connected_) {
         send_heartbeat(false);
     }
 }
@@ -209,9 +214,9 @@ void bridge::send_heartbeat(bool starting) {
                          .interval = interval(),
                          .names = home_.digest,
                          .replaces = replaced_,
-                         .leaving = leaving_,
+                         .leaving = left_,
                          .starting = starting};
-    if (!leaving_) {
+    if (!left_) {
         pools_.on_heartbeat(self_, said, now_); // so that `publisher_of` considers it
     }
     heartbeat_sent_ = now_;

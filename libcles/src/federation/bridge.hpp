@@ -96,8 +96,10 @@ class bridge final : private sent_requests_events {
     /// To be called at `due`, and when the node's pool has changed.
     void on_time(time_point now);
     [[nodiscard]] time_point due() const noexcept { return due_; }
-    /// Takes no more requests, and tells the others.
+    /// Takes no more requests. Those in flight continue.
     void leave();
+    /// The node has closed all links: tells the others that this bridge is gone.
+    void say_left();
 
     /// A line of the node, without LF.
     void on_line(const bridge_link& from, std::string_view line, time_point now);
@@ -166,7 +168,8 @@ class bridge final : private sent_requests_events {
     std::string replaced_; // the instance before
     std::size_t max_message_ = 0;
     bool connected_ = false;
-    bool leaving_ = false;
+    bool leaving_ = false; // takes no more requests
+    bool left_ = false;
     time_point connected_at_{};
     bool pools_may_appear_ = false; // names with their prefix are taken for theirs
     time_point now_{};

@@ -165,6 +165,8 @@ void federated_pools::leave() {
 void federated_pools::stop_if_finished() {
     if (leaving_ && links_.empty() && !std::exchange(stopped_, true)) {
         if (connection_) {
+            bridge_->say_left();
+            connection_->flush();
             connection_->stop();
         }
         if (timer_) {
