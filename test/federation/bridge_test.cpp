@@ -637,6 +637,41 @@ BOOST_FIXTURE_TEST_CASE(two_sites_with_one_name_are_reported, two_pools) {
     BOOST_TEST(hub.logged.empty());
 }
 
+BOOST_FIXTURE_TEST_CASE(a_pool_is_forgotten_an_hour_after_its_last_bridge, two_pools) {
+    gate.disconnect();
+    nats.run_for(59min);
+    BOOST_TEST(hub.core().pool_of("car9", nats.now()) == "north");
+    nats.run_for(2min);
+    BOOST_TEST(hub.core().pool_of("car9", nats.now()).empty());
+    BOOST_TEST(!hub.core().pools().is_known("north"));
+    gate.connect();
+    nats.run_for(1s);
+    BOOST_TEST(hub.core().pool_of("car9", nats.now()) == "north");
+    // Without a connection, nothing can be known of the others.
+    hub.disconnect();
+    nats.run_for(120min);
+    nats.impair().longest_delay = 5ms;
+    hub.connect();
+    hub.core().on_time(nats.now());
+    BOOST_TEST(hub.core().pools().is_known("north"));
+}
+
+BOOST_AUTO_TEST_CASE(pools_without_bridges_make_room) {
+    cles::bridging::pool_table table;
+    const cles::bridging::heartbeat said{.node = "gate"};
+    const cles::time_point now{1h};
+    for (std::size_t i = 0; i < table.max_pools; ++i) {
+        table.on_heartbeat({"p" + std::to_string(i), "0123456789abcdef"}, said, now);
+    }
+    using arrival = cles::bridging::pool_table::arrival;
+    BOOST_TEST((table.on_heartbeat({"new", "0123456789abcdef"}, said, now) == arrival::ignored));
+    table.remove({"p7", "0123456789abcdef"}, now + 2s);
+    table.remove({"p9", "0123456789abcdef"}, now + 1s);
+    BOOST_TEST((table.on_heartbeat({"new", "0123456789abcdef"}, said, now + 3s) == arrival::fresh));
+    BOOST_TEST(table.is_known("p7"));
+    BOOST_TEST(!table.is_known("p9"));
+}
+
 BOOST_FIXTURE_TEST_CASE(a_suspension_is_no_loss, two_pools) {
     // The hub did not run for a minute: it has received nothing, and is late.
     const auto later = nats.now() + 60s;

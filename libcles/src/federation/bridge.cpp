@@ -72,6 +72,7 @@ void bridge::on_connected(std::uint64_t drawn, std::size_t max_message, time_poi
     }
     home_ = names_of(out_.home_names());
     round_trip_.reset();
+    pools_.note_connection(now);
     send_heartbeat(true);
     due_ = next_heartbeat_;
 }
@@ -89,7 +90,7 @@ void bridge::on_disconnected(std::string_view why) {
     published_.clear();
     asked_names_.clear();
     binds_.clear();
-    pools_.clear();
+    pools_.clear(now_);
     out_.lose_all(text);
     out_.on_pools_changed();
 }
@@ -132,6 +133,9 @@ void bridge::on_time(time_point now) {
     }
     for (const auto& gone : pools_.expire(now)) {
         on_lost(gone, "the bridge of the pool '" + gone.pool + "' was not received any more");
+    }
+    if (pools_.forget_pools(now)) {
+        out_.on_pools_changed();
     }
     std::erase_if(strange_, [&](const auto& each) {
         const bool is_over = each.second <= now;
@@ -238,12 +242,12 @@ void bridge::on_heartbeat(const subject& from, std::string_view message, time_po
     }
     if (!said->replaces.empty()) {
         const bridge_id before{id.pool, said->replaces};
-        if (pools_.remove(before)) {
+        if (pools_.remove(before, now)) {
             on_lost(before, "the bridge of the pool '" + id.pool + "' has connected to NATS again");
         }
     }
     if (said->leaving) {
-        if (pools_.remove(id)) {
+        if (pools_.remove(id, now)) {
             on_lost(id, "the bridge of the pool '" + id.pool + "' has left");
         }
         return;

@@ -26,18 +26,18 @@ std::uint64_t hash_of(std::string_view instance, std::string_view noun) noexcept
 } // namespace
 
 pool_table::arrival pool_table::on_heartbeat(const bridge_id& from, const heartbeat& said, time_point now) {
+    if (bridge_count_ >= max_bridges && !is_live(from)) {
+        return arrival::ignored;
+    }
     auto found = pools_.find(from.pool);
     if (found == pools_.end()) {
-        if (pools_.size() >= max_pools) {
+        if (pools_.size() >= max_pools && !make_room()) {
             return arrival::ignored;
         }
         found = pools_.emplace(from.pool, pool{}).first;
     }
     auto& bridges = found->second.bridges;
     const auto known = bridges.find(from.instance);
-    if (known == bridges.end() && bridge_count_ >= max_bridges) {
-        return arrival::ignored;
-    }
     const bool fresh = known == bridges.end();
     auto& entry = fresh ? bridges[from.instance] : known->second;
     const auto since = fresh ? now : entry.since;
@@ -49,11 +49,26 @@ pool_table::arrival pool_table::on_heartbeat(const bridge_id& from, const heartb
     return lost_.erase(from) != 0 ? arrival::returned : arrival::fresh;
 }
 
-bool pool_table::remove(const bridge_id& gone) {
+// For another pool, by forgetting the one that has been without bridges for longest.
+bool pool_table::make_room() {
+    auto oldest = pools_.end();
+    for (auto at = pools_.begin(); at != pools_.end(); ++at) {
+        if (at->second.bridges.empty() &&
+            (oldest == pools_.end() || at->second.without_bridges < oldest->second.without_bridges)) {
+            oldest = at;
+        }
+    }
+    return oldest != pools_.end() && (pools_.erase(oldest), true);
+}
+
+bool pool_table::remove(const bridge_id& gone, time_point now) {
     const auto found = pools_.find(gone.pool);
-    const bool removed = found != pools_.end() && found->second.bridges.erase(gone.instance) != 0;
-    bridge_count_ -= removed ? 1 : 0;
-    return removed;
+    if (found == pools_.end() || found->second.bridges.erase(gone.instance) == 0) {
+        return false;
+    }
+    found->second.without_bridges = now;
+    --bridge_count_;
+    return true;
 }
 
 std::vector<bridge_id> pool_table::expire(time_point now) {
@@ -66,7 +81,7 @@ std::vector<bridge_id> pool_table::expire(time_point now) {
         }
     }
     for (const auto& each : gone) {
-        remove(each);
+        remove(each, now);
         if (lost_.size() >= max_bridges) { // the other is then not told
             lost_.clear();
         }
@@ -83,12 +98,26 @@ void pool_table::note_suspension(time_point now) {
     }
 }
 
-void pool_table::clear() {
+void pool_table::clear(time_point now) {
     for (auto& [name, p] : pools_) {
+        p.without_bridges = p.bridges.empty() ? p.without_bridges : now;
         p.bridges.clear();
     }
     lost_.clear();
     bridge_count_ = 0;
+}
+
+void pool_table::note_connection(time_point now) {
+    constexpr std::chrono::minutes at_least{1}; // the longest interval between heartbeats
+    for (auto& [name, p] : pools_) {
+        p.without_bridges = std::max(p.without_bridges, now + at_least - kept_for);
+    }
+}
+
+bool pool_table::forget_pools(time_point now) {
+    return std::erase_if(pools_, [now](const auto& each) {
+               return each.second.bridges.empty() && each.second.without_bridges + kept_for <= now;
+           }) != 0;
 }
 
 bool pool_table::set_names(std::string_view of, node_names said) {

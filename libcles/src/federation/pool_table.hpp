@@ -24,6 +24,7 @@ class pool_table {
     static constexpr std::size_t max_pools = 1024;
     static constexpr std::size_t max_bridges = 4096;
     static constexpr std::size_t max_names = 65'536;
+    static constexpr std::chrono::hours kept_for{1}; ///< a pool without bridges
 
     struct bridge {
         std::string node;
@@ -35,6 +36,7 @@ class pool_table {
     struct pool {
         std::map<std::string, bridge, std::less<>> bridges; ///< that are live, by instance
         node_names names;                                   ///< the last that were received
+        time_point without_bridges;                         ///< since when, if there is none
     };
     enum class arrival : std::uint8_t {
         known,
@@ -46,13 +48,17 @@ class pool_table {
     /// A bridge says that it lives.
     arrival on_heartbeat(const bridge_id& from, const heartbeat& said, time_point now);
     /// Removes a bridge. Returns false if it is not known.
-    bool remove(const bridge_id& gone);
+    bool remove(const bridge_id& gone, time_point now);
     /// Removes those that were silent for too long, and returns them.
     std::vector<bridge_id> expire(time_point now);
     /// Nothing could be received for a while: silence counts from now on.
     void note_suspension(time_point now);
     /// All bridges are unknown from now on. The pools, and the names of their nodes, remain known.
-    void clear();
+    void clear(time_point now);
+    /// Bridges can be received again. Pools that have none are kept for a while from now on.
+    void note_connection(time_point now);
+    /// Removes the pools that have had no bridge for too long. Returns whether there were any.
+    bool forget_pools(time_point now);
 
     /// Returns whether anything has changed.
     bool set_names(std::string_view of, node_names said);
@@ -71,6 +77,8 @@ class pool_table {
     [[nodiscard]] const std::map<std::string, pool, std::less<>>& pools() const noexcept { return pools_; }
 
   private:
+    bool make_room();
+
     std::map<std::string, pool, std::less<>> pools_;
     std::set<bridge_id> lost_; ///< for lack of heartbeats
     std::size_t bridge_count_ = 0;
