@@ -672,6 +672,31 @@ BOOST_AUTO_TEST_CASE(pools_without_bridges_make_room) {
     BOOST_TEST(!table.is_known("p9"));
 }
 
+BOOST_FIXTURE_TEST_CASE(a_pool_has_the_nodes_that_any_of_its_bridges_sees, two_pools) {
+    site second{nats, "north", "second"};
+    second.names = {"second", "car8"};
+    second.connect();
+    nats.run_for(2s);
+    const auto asked = nats.published("names");
+    const auto changed = hub.pools_changed;
+    for (int i = 0; i < 10; ++i) {
+        nats.run_for(700ms);
+        BOOST_TEST(hub.core().pool_of("car8", nats.now()) == "north");
+        BOOST_TEST(hub.core().pool_of("car9", nats.now()) == "north");
+    }
+    BOOST_TEST(nats.published("names") == asked);
+    BOOST_TEST(hub.pools_changed == changed);
+    BOOST_TEST(hub.core().pools().node_count(hub.core().pools().pools().find("north")->second) == 5U);
+    second.names = {"second", "car7"};
+    nats.run_for(2s);
+    BOOST_TEST(hub.core().pool_of("car7", nats.now()) == "north");
+    BOOST_TEST(hub.core().pool_of("car8", nats.now()).empty());
+    second.restart();
+    nats.run_for(2s);
+    BOOST_TEST(hub.core().pool_of("car7", nats.now()).empty());
+    BOOST_TEST(hub.core().pool_of("car9", nats.now()) == "north");
+}
+
 BOOST_FIXTURE_TEST_CASE(a_suspension_is_no_loss, two_pools) {
     // The hub did not run for a minute: it has received nothing, and is late.
     const auto later = nats.now() + 60s;

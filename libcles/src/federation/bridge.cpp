@@ -291,7 +291,7 @@ void bridge::on_names(const subject& from, std::string_view message) {
     auto said = parse_names(message, pool_table::max_names);
     if (!said) {
         drop(names_subject(from.bridge()), "it is not a list of names");
-    } else if (pools_.set_names(from.pool, std::move(*said))) {
+    } else if (pools_.set_names(from.bridge(), std::move(*said))) {
         asked_names_.erase(from.bridge());
         out_.on_pools_changed();
     }

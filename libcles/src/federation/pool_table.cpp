@@ -10,6 +10,19 @@ namespace {
 // As for nodes (docs/protocol.md, "Membership").
 time_point lost_at(const pool_table::bridge& b) { return b.heard + b.interval * 7 / 2; }
 
+// The names that no bridge states any more; not the last ones.
+void drop_unstated(pool_table::pool& p) {
+    std::set<std::string_view> stated;
+    for (const auto& [instance, b] : p.bridges) {
+        if (p.names.contains(b.names)) {
+            stated.insert(b.names);
+        }
+    }
+    if (!stated.empty()) {
+        std::erase_if(p.names, [&stated](const auto& each) { return !stated.contains(each.first); });
+    }
+}
+
 std::uint64_t hash_of(std::string_view instance, std::string_view noun) noexcept {
     std::uint64_t hash = 0xcbf29ce484222325U;
     for (const auto text : {instance, noun}) {
@@ -41,7 +54,10 @@ pool_table::arrival pool_table::on_heartbeat(const bridge_id& from, const heartb
     const bool fresh = known == bridges.end();
     auto& entry = fresh ? bridges[from.instance] : known->second;
     const auto since = fresh ? now : entry.since;
-    entry = {.node = said.node, .interval = said.interval, .names = said.names, .heard = now, .since = since};
+    const bool knows = found->second.names.contains(said.names);
+    auto names = knows ? said.names : std::move(entry.names);
+    entry = {.node = said.node, .interval = said.interval, .names = std::move(names), .heard = now, .since = since};
+    drop_unstated(found->second);
     if (!fresh) {
         return arrival::known;
     }
@@ -67,6 +83,7 @@ bool pool_table::remove(const bridge_id& gone, time_point now) {
         return false;
     }
     found->second.without_bridges = now;
+    drop_unstated(found->second);
     --bridge_count_;
     return true;
 }
@@ -120,23 +137,44 @@ bool pool_table::forget_pools(time_point now) {
            }) != 0;
 }
 
-bool pool_table::set_names(std::string_view of, node_names said) {
-    const auto found = pools_.find(of);
-    if (found == pools_.end() || found->second.names == said) {
+bool pool_table::set_names(const bridge_id& from, node_names said) {
+    const auto found = pools_.find(from.pool);
+    if (found == pools_.end()) {
+        return false;
+    }
+    auto& p = found->second;
+    const auto by = p.bridges.find(from.instance);
+    if (by == p.bridges.end()) { // it is asked again when its heartbeat has arrived
         return false;
     }
     std::size_t others = 0;
-    for (const auto& [name, p] : pools_) {
-        others += name == of ? 0 : p.names.nodes.size();
+    for (const auto& [name, each] : pools_) {
+        for (const auto& [digest, nodes] : each.names) {
+            others += name == from.pool && (digest == said.digest || digest == by->second.names) ? 0 : nodes.size();
+        }
     }
     said.nodes.resize(std::min(said.nodes.size(), max_names - std::min(others, max_names)));
-    found->second.names = std::move(said);
+    const auto known = p.names.find(said.digest);
+    if (by->second.names == said.digest && known != p.names.end() && known->second == said.nodes) {
+        return false;
+    }
+    by->second.names = said.digest;
+    p.names.insert_or_assign(std::move(said.digest), std::move(said.nodes));
+    drop_unstated(p);
     return true;
 }
 
 bool pool_table::lacks_names(std::string_view of, std::string_view digest) const {
     const auto found = pools_.find(of);
-    return found != pools_.end() && found->second.names.digest != digest;
+    return found != pools_.end() && !found->second.names.contains(digest);
+}
+
+std::size_t pool_table::node_count(const pool& of) {
+    std::set<std::string_view> nodes;
+    for (const auto& [digest, some] : of.names) {
+        nodes.insert(some.begin(), some.end());
+    }
+    return nodes.size();
 }
 
 bool pool_table::is_live(std::string_view name) const {
@@ -152,7 +190,9 @@ bool pool_table::is_live(const bridge_id& which) const {
 std::string_view pool_table::pool_of(std::string_view node, std::string_view except) const {
     std::string_view silent;
     for (const auto& [name, p] : pools_) {
-        if (name == except || !std::ranges::binary_search(p.names.nodes, node, std::less<>{})) {
+        const bool has_it = std::ranges::any_of(
+            p.names, [node](const auto& some) { return std::ranges::binary_search(some.second, node, std::less<>{}); });
+        if (name == except || !has_it) {
             continue;
         }
         if (!p.bridges.empty()) {

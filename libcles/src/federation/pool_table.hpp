@@ -29,14 +29,16 @@ class pool_table {
     struct bridge {
         std::string node;
         std::chrono::milliseconds interval{0};
-        std::string names; ///< the digest that it states
+        std::string names; ///< the digest of those that it has stated last, and that are known
         time_point heard;
         time_point since; ///< when it was first received
     };
     struct pool {
         std::map<std::string, bridge, std::less<>> bridges; ///< that are live, by instance
-        node_names names;                                   ///< the last that were received
-        time_point without_bridges;                         ///< since when, if there is none
+        /// Names of nodes by their digest: what the bridges have stated, which may know different nodes, or the last
+        /// that were received. The pool has all of these.
+        std::map<std::string, std::vector<std::string>, std::less<>> names;
+        time_point without_bridges; ///< since when, if there is none
     };
     enum class arrival : std::uint8_t {
         known,
@@ -60,10 +62,12 @@ class pool_table {
     /// Removes the pools that have had no bridge for too long. Returns whether there were any.
     bool forget_pools(time_point now);
 
-    /// Returns whether anything has changed.
-    bool set_names(std::string_view of, node_names said);
+    /// What that bridge says of its pool. Returns whether anything has changed.
+    bool set_names(const bridge_id& from, node_names said);
     /// Whether the names with that digest are to be asked for.
     [[nodiscard]] bool lacks_names(std::string_view of, std::string_view digest) const;
+    /// How many nodes the pool has.
+    [[nodiscard]] static std::size_t node_count(const pool& of);
 
     [[nodiscard]] bool is_known(std::string_view name) const { return pools_.contains(name); }
     [[nodiscard]] bool is_live(std::string_view name) const;

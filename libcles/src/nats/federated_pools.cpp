@@ -502,7 +502,7 @@ void federated_pools::write_metrics(json_writer& w) const {
                 w.key("bridges");
                 w.value(std::uint64_t{p.bridges.size()});
                 w.key("nodes");
-                w.value(std::uint64_t{p.names.nodes.size()});
+                w.value(std::uint64_t{bridging::pool_table::node_count(p)});
                 w.end_object();
             }
         }
