@@ -329,7 +329,8 @@ void federated_pools::on_timer(boost::system::error_code code) {
 
 void federated_pools::on_event(const event& e) {
     const auto log_once = [this, &e](const std::string& text) {
-        if (std::exchange(last_problem_, e.text) != e.text) {
+        last_problem_ = e.text;
+        if (logged_.add(e.text)) {
             log(log_level::warning, text);
         }
     };
@@ -337,6 +338,7 @@ void federated_pools::on_event(const event& e) {
     case event::kind::connected: {
         log(log_level::info, "connected to NATS, as a bridge of the pool '" + options_.pool + "'");
         last_problem_.clear();
+        logged_.clear();
         std::random_device random;
         bridge_->on_connected((std::uint64_t{random()} << 32U) | random(), e.max_message, now());
         break;

@@ -5,6 +5,7 @@
 #include <cles/link.hpp>
 
 #include "federation/bridge.hpp"
+#include "federation/logged_problems.hpp"
 #include "nats/nats_connection.hpp"
 #include "nats/pool_link.hpp"
 #include "node/routing/other_pools.hpp"
@@ -116,7 +117,8 @@ class federated_pools final : public core::other_pools,
     std::deque<std::shared_ptr<pool_link>> ready_; // have something for the node
     std::deque<event> events_;
     std::list<waiting_dial> dials_;
-    std::string last_problem_; // that was logged
+    std::string last_problem_;
+    bridging::logged_problems logged_; // since it was connected
     std::uint32_t last_link_ = 0;
     std::uint64_t last_dial_ = 0;
     bool claimed_ = false;
