@@ -201,9 +201,23 @@ BOOST_FIXTURE_TEST_CASE(what_a_lost_bridge_took_is_unavailable, two_pools) {
 
 BOOST_FIXTURE_TEST_CASE(the_last_bridge_of_a_pool_takes_the_link_with_it, two_pools) {
     gate.core().leave();
+    gate.core().say_left();
     nats.run_for(10ms);
     BOOST_TEST(!hub.core().is_live("north"));
     BOOST_TEST(count(hub.lost, "pool north") == 1U);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_bridge_that_leaves_completes_what_it_has_taken, two_pools) {
+    gate.answer_after = 5s;
+    const auto id = hub.ask("north", "DELEGATE car9:echo deadline=10000 {\"n\":1}");
+    nats.run_for(10ms);
+    gate.core().leave();
+    BOOST_TEST(!gate.subscribes("cles.north.push.car9.echo", true));
+    nats.run_for(6s);
+    BOOST_TEST(hub.answer(id) == "{\"n\":1}");
+    gate.core().say_left();
+    nats.run_for(10ms);
+    BOOST_TEST(!hub.core().is_live("north"));
 }
 
 BOOST_FIXTURE_TEST_CASE(requests_of_a_lost_bridge_are_cancelled, two_pools) {
@@ -324,6 +338,25 @@ BOOST_FIXTURE_TEST_CASE(foreign_messages_are_dropped_and_logged_once, two_pools)
     BOOST_TEST(gate.core().is_live("south"));
 }
 
+BOOST_FIXTURE_TEST_CASE(a_message_with_a_line_feed_does_not_reach_the_node, two_pools) {
+    gate.answer_after = 1s;
+    const auto id = hub.ask("north", "DELEGATE car9:echo {\"n\":1}");
+    nats.run_for(10ms);
+    nats.publish("cles.south.bridge." + hub.core().self().instance + ".1", "", "{\"value\":\n12}");
+    nats.run_for(10ms);
+    BOOST_TEST(hub.answer(id) == R"({"error":"failed","message":"the reply that came through NATS is not one line"})");
+    BOOST_TEST(count(gate.cancelled, "{\"n\":1}") == 1U);
+    hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    nats.publish("cles.north.feed.car9.speed", "", " seq=1 epoch=5f3a09c1 {\"n\":\n1}");
+    nats.publish("cles.north.push.car9.echo", "_INBOX.x", "{\"n\":\n2}");
+    nats.run_for(10ms);
+    BOOST_TEST(hub.updates.empty());
+    BOOST_TEST(has_words(nats.recorded("_INBOX.x"), "bad_request"));
+    BOOST_TEST(hub.core().counted().messages_refused == 2U);
+    BOOST_TEST(gate.core().counted().messages_refused == 1U);
+}
+
 BOOST_FIXTURE_TEST_CASE(what_is_too_long_is_refused, two_pools) {
     const auto id = hub.ask("north", "PUSH car9:echo {\"n\":\"" + std::string(70'000, 'x') + "\"}");
     nats.run_for(10ms);
@@ -339,6 +372,33 @@ BOOST_FIXTURE_TEST_CASE(what_is_too_long_is_refused, two_pools) {
     nats.run_for(10ms);
     BOOST_TEST(hub.answer(late).starts_with(R"({"error":"too_large")"));
     BOOST_TEST(hub.answer(late).find(R"("ran":true)") != std::string::npos);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_reply_for_which_there_is_no_room_is_a_failure, two_pools) {
+    gate.answer_after = 50ms;
+    const auto id = hub.ask("north", "PUSH car9:echo {\"n\":1}");
+    const auto refused = hub.ask("north", "PUSH car9:echo {\"n\":2}");
+    nats.run_for(10ms);
+    gate.is_full = true;
+    gate.core().on_line({bridge_link::role::from_pool, "south"}, R"(id=2 {"error":"new","x":1})", nats.now());
+    nats.run_for(2s);
+    BOOST_TEST(hub.answer(id).starts_with(R"({"error":"busy")"));
+    BOOST_TEST(hub.answer(id).find(R"("ran":true)") != std::string::npos);
+    BOOST_TEST(hub.answer(refused) == R"({"error":"new","x":1})");
+    BOOST_TEST(hub.core().is_live("north"));
+    const auto bind = hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    BOOST_TEST(hub.answer(bind) == "{}");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_reply_that_is_too_long_here_fails_the_request, two_pools) {
+    gate.answer_after = 1s;
+    const auto id = hub.ask("north", "PUSH car9:echo {\"n\":1}");
+    nats.run_for(10ms);
+    nats.publish("cles.south.bridge." + hub.core().self().instance + ".1", "", std::string(70'000, 'x'));
+    nats.run_for(10ms);
+    BOOST_TEST(hub.answer(id).starts_with(R"({"error":"too_large")"));
+    BOOST_TEST(hub.answer(id).find(R"("ran":true)") != std::string::npos);
 }
 
 BOOST_FIXTURE_TEST_CASE(the_link_answers_what_the_node_asks_itself, two_pools) {
@@ -500,6 +560,79 @@ BOOST_FIXTURE_TEST_CASE(a_binding_ended_before_its_reply_does_not_remain, two_po
     BOOST_TEST(!gate.bound.contains("car9:speed"));
 }
 
+// Holds back what comes from the pool north, and lets it pass later.
+struct slow_replies : two_pools {
+    std::vector<std::pair<std::string, std::string>> held;
+
+    slow_replies() {
+        nats.lose = [this](const std::string& subject, const std::string& message) {
+            const bool is_reply = subject.starts_with("cles.south.bridge") && !subject.ends_with("control");
+            if (is_reply) {
+                held.emplace_back(subject, message);
+            }
+            return is_reply;
+        };
+    }
+    void pass() {
+        nats.lose = nullptr;
+        for (const auto& [subject, message] : std::exchange(held, {})) {
+            nats.publish(subject, {}, message);
+        }
+        nats.run_for(10ms);
+    }
+};
+
+BOOST_FIXTURE_TEST_CASE(a_binding_that_is_cancelled_does_not_remain, slow_replies) {
+    const auto id = hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    hub.cancel("north", id);
+    BOOST_TEST(!hub.subscribes("cles.north.feed.car9.speed", false));
+    BOOST_TEST(gate.bound.contains("car9:speed"));
+    pass();
+    BOOST_TEST(!gate.bound.contains("car9:speed"));
+    BOOST_TEST(hub.answers[id].empty());
+}
+
+BOOST_FIXTURE_TEST_CASE(a_binding_of_a_link_that_is_closed_does_not_remain, slow_replies) {
+    hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    hub.core().on_closed({bridge_link::role::to_pool, "north", 1});
+    pass();
+    BOOST_TEST(!gate.bound.contains("car9:speed"));
+}
+
+BOOST_FIXTURE_TEST_CASE(a_binding_that_is_acknowledged_too_late_does_not_remain, slow_replies) {
+    const auto id = hub.ask("north", "BIND car9:speed deadline=60000");
+    nats.run_for(3s);
+    BOOST_TEST(hub.answer(id).starts_with(R"({"error":"unavailable")"));
+    pass();
+    BOOST_TEST(!gate.bound.contains("car9:speed"));
+}
+
+BOOST_FIXTURE_TEST_CASE(a_binding_whose_reply_is_lost_does_not_remain, slow_replies) {
+    hub.ask("north", "BIND car9:speed deadline=1000");
+    nats.run_for(10ms);
+    BOOST_REQUIRE(held.size() == 2U); // the acknowledgement and the reply
+    held.pop_back();
+    pass();
+    nats.run_for(3s);
+    BOOST_TEST(!gate.bound.contains("car9:speed"));
+    BOOST_TEST(!hub.subscribes("cles.north.feed.car9.speed", false));
+}
+
+BOOST_FIXTURE_TEST_CASE(another_binding_of_the_noun_survives_a_cancellation, two_pools) {
+    hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    nats.impair().longest_delay = 5ms;
+    const auto id = hub.ask("north", "BIND north.car9:speed");
+    hub.cancel("north", id);
+    nats.run_for(100ms);
+    BOOST_TEST(gate.bound.contains("car9:speed"));
+    gate.update("car9:speed", 1);
+    nats.run_for(10ms);
+    BOOST_TEST((hub.updates == std::vector<std::string>{"UPDATE car9:speed seq=1 epoch=5f3a09c1 {\"n\":1}"}));
+}
+
 // -- the pools -----------------------------------------------------------------------------------------------------
 
 BOOST_FIXTURE_TEST_CASE(two_sites_with_one_name_are_reported, two_pools) {
@@ -511,6 +644,66 @@ BOOST_FIXTURE_TEST_CASE(two_sites_with_one_name_are_reported, two_pools) {
     BOOST_REQUIRE(gate.logged.size() == 1U);
     BOOST_TEST(gate.logged[0].find("'stranger' is of the pool 'north' too") != std::string::npos);
     BOOST_TEST(hub.logged.empty());
+}
+
+BOOST_FIXTURE_TEST_CASE(a_pool_is_forgotten_an_hour_after_its_last_bridge, two_pools) {
+    gate.disconnect();
+    nats.run_for(59min);
+    BOOST_TEST(hub.core().pool_of("car9", nats.now()) == "north");
+    nats.run_for(2min);
+    BOOST_TEST(hub.core().pool_of("car9", nats.now()).empty());
+    BOOST_TEST(!hub.core().pools().is_known("north"));
+    gate.connect();
+    nats.run_for(1s);
+    BOOST_TEST(hub.core().pool_of("car9", nats.now()) == "north");
+    // Without a connection, nothing can be known of the others.
+    hub.disconnect();
+    nats.run_for(120min);
+    nats.impair().longest_delay = 5ms;
+    hub.connect();
+    hub.core().on_time(nats.now());
+    BOOST_TEST(hub.core().pools().is_known("north"));
+}
+
+BOOST_AUTO_TEST_CASE(pools_without_bridges_make_room) {
+    cles::bridging::pool_table table;
+    const cles::bridging::heartbeat said{.node = "gate"};
+    const cles::time_point now{1h};
+    for (std::size_t i = 0; i < table.max_pools; ++i) {
+        table.on_heartbeat({"p" + std::to_string(i), "0123456789abcdef"}, said, now);
+    }
+    using arrival = cles::bridging::pool_table::arrival;
+    BOOST_TEST((table.on_heartbeat({"new", "0123456789abcdef"}, said, now) == arrival::ignored));
+    table.remove({"p7", "0123456789abcdef"}, now + 2s);
+    table.remove({"p9", "0123456789abcdef"}, now + 1s);
+    BOOST_TEST((table.on_heartbeat({"new", "0123456789abcdef"}, said, now + 3s) == arrival::fresh));
+    BOOST_TEST(table.is_known("p7"));
+    BOOST_TEST(!table.is_known("p9"));
+}
+
+BOOST_FIXTURE_TEST_CASE(a_pool_has_the_nodes_that_any_of_its_bridges_sees, two_pools) {
+    site second{nats, "north", "second"};
+    second.names = {"second", "car8"};
+    second.connect();
+    nats.run_for(2s);
+    const auto asked = nats.published("names");
+    const auto changed = hub.pools_changed;
+    for (int i = 0; i < 10; ++i) {
+        nats.run_for(700ms);
+        BOOST_TEST(hub.core().pool_of("car8", nats.now()) == "north");
+        BOOST_TEST(hub.core().pool_of("car9", nats.now()) == "north");
+    }
+    BOOST_TEST(nats.published("names") == asked);
+    BOOST_TEST(hub.pools_changed == changed);
+    BOOST_TEST(hub.core().pools().node_count(hub.core().pools().pools().find("north")->second) == 5U);
+    second.names = {"second", "car7"};
+    nats.run_for(2s);
+    BOOST_TEST(hub.core().pool_of("car7", nats.now()) == "north");
+    BOOST_TEST(hub.core().pool_of("car8", nats.now()).empty());
+    second.restart();
+    nats.run_for(2s);
+    BOOST_TEST(hub.core().pool_of("car7", nats.now()).empty());
+    BOOST_TEST(hub.core().pool_of("car9", nats.now()) == "north");
 }
 
 BOOST_FIXTURE_TEST_CASE(a_suspension_is_no_loss, two_pools) {

@@ -189,7 +189,10 @@ bool site::subscribes(std::string_view subject, bool shared) const {
                        [&](const auto& each) { return each.second == shared && matches(each.first, subject); });
 }
 
-bool site::publish(std::string subject, std::string reply, std::string message) {
+bool site::publish(std::string subject, std::string reply, std::string message, room in) {
+    if (is_full && in == room::shared) {
+        return false;
+    }
     if (connection_ != 0) {
         nats_.publish(subject, reply, message);
     }

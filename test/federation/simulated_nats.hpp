@@ -101,9 +101,10 @@ class site final : public bridge_output {
     std::vector<std::string> lost; ///< what was lost: "to_pool north", "bindings north", "all"
     std::vector<std::string> logged;
     int pools_changed = 0;
+    bool is_full = false; ///< only short messages can be published
 
   private:
-    bool publish(std::string subject, std::string reply, std::string message) override;
+    bool publish(std::string subject, std::string reply, std::string message, room in) override;
     void subscribe(std::string subject, bool shared) override;
     void unsubscribe(const std::string& subject) override;
     void deliver(const bridge_link& on, std::string line) override;

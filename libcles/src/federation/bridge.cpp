@@ -24,6 +24,7 @@ constexpr std::chrono::minutes between_drop_logs{1};
 constexpr std::uint32_t upstream_keep = 1024;
 constexpr std::chrono::seconds remembered_for{10}; // after a bridge is lost, or before it is known
 constexpr std::size_t max_strange = 1024;
+constexpr std::size_t max_short = 1024; // of a failure for which room is reserved
 
 constexpr std::string_view cancel_path = "cles/cancel/";
 constexpr std::string_view lost_line = "PUSH self:cles/lost";
@@ -71,6 +72,7 @@ void bridge::on_connected(std::uint64_t drawn, std::size_t max_message, time_poi
     }
     home_ = names_of(out_.home_names());
     round_trip_.reset();
+    pools_.note_connection(now);
     send_heartbeat(true);
     due_ = next_heartbeat_;
 }
@@ -88,7 +90,7 @@ void bridge::on_disconnected(std::string_view why) {
     published_.clear();
     asked_names_.clear();
     binds_.clear();
-    pools_.clear();
+    pools_.clear(now_);
     out_.lose_all(text);
     out_.on_pools_changed();
 }
@@ -98,6 +100,11 @@ void bridge::leave() {
         for (const auto how : {verb::pull, verb::push, verb::delegate, verb::bind, verb::update}) {
             out_.unsubscribe(request_filter(setup_.pool, how));
         }
+    }
+}
+
+void bridge::say_left() {
+    if (!std::exchange(left_, true) && connected_) {
         send_heartbeat(false);
     }
 }
@@ -126,6 +133,9 @@ void bridge::on_time(time_point now) {
     }
     for (const auto& gone : pools_.expire(now)) {
         on_lost(gone, "the bridge of the pool '" + gone.pool + "' was not received any more");
+    }
+    if (pools_.forget_pools(now)) {
+        out_.on_pools_changed();
     }
     std::erase_if(strange_, [&](const auto& each) {
         const bool is_over = each.second <= now;
@@ -157,6 +167,23 @@ void bridge::on_message(std::string_view where, std::string_view reply, std::str
             refuse_foreign(std::string{reply},
                            {.code = errc::too_large,
                             .message = "a request has at most " + std::to_string(max_message_) + " bytes here"});
+        } else if (about.kind == subject_kind::reply) {
+            sent_.on_unusable(about.number, message,
+                              {.code = errc::too_large,
+                               .message = "the reply has " + std::to_string(message.size()) + " bytes; at most " +
+                                          std::to_string(max_message_) + " are read here",
+                               .ran = true});
+        }
+        return;
+    }
+    if (message.find('\n') != std::string_view::npos) { // would end a line of the node's links
+        constexpr std::string_view why = "a message of NATS holds one line";
+        drop(where, why);
+        if (about.kind == subject_kind::request) {
+            refuse_foreign(std::string{reply}, {.code = errc::bad_request, .message = std::string{why}});
+        } else if (about.kind == subject_kind::reply) {
+            sent_.on_unusable(about.number, message,
+                              {.code = errc::failed, .message = "the reply that came through NATS is not one line"});
         }
         return;
     }
@@ -191,13 +218,13 @@ void bridge::send_heartbeat(bool starting) {
                          .interval = interval(),
                          .names = home_.digest,
                          .replaces = replaced_,
-                         .leaving = leaving_,
+                         .leaving = left_,
                          .starting = starting};
-    if (!leaving_) {
+    if (!left_) {
         pools_.on_heartbeat(self_, said, now_); // so that `publisher_of` considers it
     }
     heartbeat_sent_ = now_;
-    out_.publish(heartbeat_subject(self_), {}, text_of(said));
+    publish_short(heartbeat_subject(self_), text_of(said));
 }
 
 void bridge::on_heartbeat(const subject& from, std::string_view message, time_point now) {
@@ -215,12 +242,12 @@ void bridge::on_heartbeat(const subject& from, std::string_view message, time_po
     }
     if (!said->replaces.empty()) {
         const bridge_id before{id.pool, said->replaces};
-        if (pools_.remove(before)) {
+        if (pools_.remove(before, now)) {
             on_lost(before, "the bridge of the pool '" + id.pool + "' has connected to NATS again");
         }
     }
     if (said->leaving) {
-        if (pools_.remove(id)) {
+        if (pools_.remove(id, now)) {
             on_lost(id, "the bridge of the pool '" + id.pool + "' has left");
         }
         return;
@@ -254,7 +281,7 @@ void bridge::send_names() {
         out_.log(log_level::warning, "the names of the pool's nodes do not fit into a message of NATS");
         return;
     }
-    out_.publish(names_subject(self_), {}, std::move(text));
+    publish(names_subject(self_), std::move(text));
 }
 
 void bridge::on_names(const subject& from, std::string_view message) {
@@ -264,14 +291,14 @@ void bridge::on_names(const subject& from, std::string_view message) {
     auto said = parse_names(message, pool_table::max_names);
     if (!said) {
         drop(names_subject(from.bridge()), "it is not a list of names");
-    } else if (pools_.set_names(from.pool, std::move(*said))) {
+    } else if (pools_.set_names(from.bridge(), std::move(*said))) {
         asked_names_.erase(from.bridge());
         out_.on_pools_changed();
     }
 }
 
 void bridge::send_control(const bridge_id& to, std::string line) {
-    out_.publish(control_subject(to), control_subject(self_), std::move(line));
+    out_.publish(control_subject(to), control_subject(self_), std::move(line), bridge_output::room::reserved);
 }
 
 void bridge::on_control(std::string_view reply, std::string_view message, time_point now) {
@@ -280,7 +307,7 @@ void bridge::on_control(std::string_view reply, std::string_view message, time_p
     protocol::request_line r;
     protocol::malformed_request wrong;
     if ((from.kind != subject_kind::control && from.kind != subject_kind::reply) ||
-        message.find('\n') != message.npos || !protocol::parse_request(message, r, wrong)) {
+        !protocol::parse_request(message, r, wrong)) {
         drop(control_subject(self_), "it is not a message of a bridge");
         return;
     }
@@ -309,6 +336,8 @@ void bridge::on_control(std::string_view reply, std::string_view message, time_p
         const auto number = protocol::parse_number(r.noun.path.substr(cancel_path.size()));
         if (const auto id = number ? taken_.id_of(by, *number) : std::nullopt) {
             cancel_taken(*id);
+        } else if (const auto noun = published_.cancel({by, std::string{reply}})) {
+            end_published(*noun);
         }
     } else {
         drop(control_subject(self_), "it is not a message of a bridge");
@@ -331,6 +360,7 @@ void bridge::on_lost(const bridge_id& gone, std::string_view why) {
         for (const auto& each : feeds_.remove_pool(gone.pool)) {
             unsubscribe_if_last(each);
         }
+        std::erase_if(binds_, [&gone](const auto& each) { return each.second.pool == gone.pool; });
         out_.lose_pool(gone.pool, why);
     } else {
         sent_.on_lost(gone, why);
@@ -396,6 +426,9 @@ void bridge::on_closed(const bridge_link& which) {
     case bridge_link::role::to_pool:
         sent_.close(which);
         end_bindings(feeds_.remove_link(which));
+        std::erase_if(binds_, [&which](const auto& each) {
+            return each.second.pool == which.pool && each.second.link == which.number;
+        });
         break;
     case bridge_link::role::from_pool:
         for (const auto id : taken_.requests_of(which.pool)) {
@@ -432,8 +465,11 @@ void bridge::deliver(std::vector<foreign_feeds::update> updates) {
 void bridge::answer_for_itself(const bridge_link& from, const protocol::request_line& r) {
     if (r.verb == verb::push && r.noun.path.starts_with(cancel_path)) {
         const auto id = protocol::parse_number(r.noun.path.substr(cancel_path.size()));
-        if (id && !binds_.contains(*id)) { // a binding is ended when it is known who holds it
+        if (id) {
             sent_.cancel(*id);
+            if (auto gone = binds_.erase(*id) != 0 ? feeds_.remove(*id) : std::nullopt) {
+                end_bindings({std::move(*gone)});
+            }
         }
     } else if (r.verb == verb::pull && r.noun.path == "cles") {
         if (r.id != 0) {
@@ -477,7 +513,7 @@ void bridge::publish_request(const bridge_link& from, const protocol::request_li
     }
     ++figures_.requests_sent;
     if (!out_.publish(request_subject(pool, r.verb, without_pool(r.noun.target, pool), r.noun.task),
-                      reply_subject(self_, number), std::move(message))) {
+                      reply_subject(self_, number), std::move(message), bridge_output::room::shared)) {
         sent_.on_message(number, failure_text({.code = errc::busy,
                                                .message = "too much waits to be sent to NATS",
                                                .retry_ms = protocol::default_retry_ms}));
@@ -548,16 +584,31 @@ void bridge::on_answer(const bridge_link& on, std::uint64_t id, std::string_view
     deliver(feeds_.on_bound(id, taker));
 }
 
+void bridge::on_forgotten(std::uint64_t id) {
+    binds_.erase(id);
+    if (auto gone = feeds_.remove(id)) {
+        end_bindings({std::move(*gone)});
+    }
+}
+
 void bridge::cancel_at(const bridge_id& taker, std::uint64_t number) {
     out_.publish(control_subject(taker), reply_subject(self_, number),
-                 "PUSH self:" + std::string{cancel_path} + std::to_string(number));
+                 "PUSH self:" + std::string{cancel_path} + std::to_string(number), bridge_output::room::reserved);
 }
 
 // -- requests of other pools ---------------------------------------------------------------------------------------
 
+bool bridge::publish(std::string subject, std::string message) {
+    return out_.publish(std::move(subject), {}, std::move(message), bridge_output::room::shared);
+}
+
+void bridge::publish_short(std::string subject, std::string message) {
+    out_.publish(std::move(subject), {}, std::move(message), bridge_output::room::reserved);
+}
+
 void bridge::refuse_foreign(const std::string& reply, const protocol::failure& why) {
     if (!reply.empty()) {
-        out_.publish(reply, {}, failure_text(why));
+        publish_short(reply, failure_text(why));
     }
 }
 
@@ -566,9 +617,7 @@ void bridge::take(const subject& about, std::string_view reply, std::string_view
     const auto text = text_of(about.verb, about.node, about.task, message);
     protocol::request_line r;
     protocol::malformed_request wrong;
-    if (text.find('\n') != std::string::npos) {
-        wrong.why = "a message of NATS holds one line";
-    } else if (protocol::parse_request(text, r, wrong) && r.is_update()) {
+    if (protocol::parse_request(text, r, wrong) && r.is_update()) {
         wrong.why = "an update with 'seq' and 'epoch' is not a request";
     }
     if (!wrong.why.empty()) {
@@ -634,7 +683,7 @@ bool bridge::remember(const bridge_id& by) {
 void bridge::on_batch() {
     for (const auto* open : taken_.take_unacknowledged()) {
         if (!open->reply.empty()) {
-            out_.publish(open->reply, {}, taken_text(self_.instance));
+            publish_short(open->reply, taken_text(self_.instance));
         }
     }
 }
@@ -654,7 +703,14 @@ void bridge::send_reply(std::string_view line) {
     }
     if (!r->reply.empty()) {
         if (parts.rest.size() <= max_message_) {
-            out_.publish(r->reply, {}, std::string{parts.rest});
+            if (is_error_reply(parts.rest) && parts.rest.size() <= max_short) {
+                publish_short(r->reply, std::string{parts.rest});
+            } else if (!publish(r->reply, std::string{parts.rest}) && !parts.is_interim) {
+                refuse_foreign(r->reply, {.code = errc::busy,
+                                          .message = "too much waits to be sent to NATS for the reply",
+                                          .retry_ms = protocol::default_retry_ms,
+                                          .ran = true});
+            }
         } else if (!parts.is_interim) {
             refuse_foreign(r->reply, {.code = errc::too_large,
                                       .message = "the reply has " + std::to_string(parts.rest.size()) +
@@ -685,11 +741,11 @@ void bridge::take_bind(const protocol::request_line& r, const taken_requests::re
     const auto publisher = pools_.publisher_of(setup_.pool, noun);
     if (!is_passed_on && publisher != self_.instance && !publisher.empty()) {
         out_.publish(control_subject({setup_.pool, std::string{publisher}}), by.reply,
-                     text_of(verb::bind, r.noun.target, r.noun.task, message_of(r, {})));
+                     text_of(verb::bind, r.noun.target, r.noun.task, message_of(r, {})), bridge_output::room::reserved);
         return;
     }
     ++figures_.requests_taken;
-    out_.publish(by.reply, {}, taken_text(self_.instance));
+    publish_short(by.reply, taken_text(self_.instance));
     if (const auto id = published_.bind(noun, {by.by, by.reply}); id != 0) {
         std::string line = "BIND " + noun + " id=" + std::to_string(id) + " deadline=" + std::to_string(r.deadline_ms) +
                            " keep=" + std::to_string(upstream_keep) + " mark=yes hops=" + std::to_string(r.hops);
@@ -705,10 +761,11 @@ void bridge::send_bind_reply(std::string_view line) {
     }
     const auto answered = published_.on_reply(parts.id, is_error_reply(parts.rest));
     for (const auto& to : answered.to) {
-        if (parts.rest.size() + max_pool_name <= max_message_) {
-            out_.publish(to, {}, taken_text(self_.instance) + " " + std::string{parts.rest});
-        } else { // it is bound nevertheless, without a value
-            out_.publish(to, {}, taken_text(self_.instance) + " {}");
+        const auto taken = taken_text(self_.instance) + " ";
+        if (is_error_reply(parts.rest) && parts.rest.size() <= max_short) {
+            publish_short(to, taken + std::string{parts.rest});
+        } else if (parts.rest.size() + max_pool_name > max_message_ || !publish(to, taken + std::string{parts.rest})) {
+            publish_short(to, taken + "{}"); // it is bound nevertheless, without a value
         }
     }
     if (answered.ends) {
@@ -731,7 +788,7 @@ void bridge::send_update(std::string_view line) {
         return;
     }
     ++figures_.updates_sent;
-    out_.publish(feed_subject(setup_.pool, noun.substr(0, colon), task), {}, std::move(message));
+    publish(feed_subject(setup_.pool, noun.substr(0, colon), task), std::move(message));
 }
 
 void bridge::end_published(const std::string& noun) {

@@ -34,8 +34,12 @@ class bridge_output {
     bridge_output(const bridge_output&) = delete;
     bridge_output& operator=(const bridge_output&) = delete;
 
+    enum class room : std::uint8_t {
+        shared,  ///< of requests, replies and updates
+        reserved ///< for short messages without which others would wait in vain: failures, control, heartbeats
+    };
     /// Returns false if too much waits already.
-    virtual bool publish(std::string subject, std::string reply, std::string message) = 0;
+    virtual bool publish(std::string subject, std::string reply, std::string message, room in) = 0;
     /// \param shared one bridge of the pool receives each message
     virtual void subscribe(std::string subject, bool shared) = 0;
     virtual void unsubscribe(const std::string& subject) = 0;
@@ -92,8 +96,10 @@ class bridge final : private sent_requests_events {
     /// To be called at `due`, and when the node's pool has changed.
     void on_time(time_point now);
     [[nodiscard]] time_point due() const noexcept { return due_; }
-    /// Takes no more requests, and tells the others.
+    /// Takes no more requests. Those in flight continue.
     void leave();
+    /// The node has closed all links: tells the others that this bridge is gone.
+    void say_left();
 
     /// A line of the node, without LF.
     void on_line(const bridge_link& from, std::string_view line, time_point now);
@@ -134,6 +140,8 @@ class bridge final : private sent_requests_events {
     void send_update(std::string_view line);
     void cancel_taken(std::uint64_t id);
     void end_published(const std::string& noun);
+    bool publish(std::string subject, std::string message);
+    void publish_short(std::string subject, std::string message);
     void refuse_foreign(const std::string& reply, const protocol::failure& why);
     void drop(std::string_view where, std::string_view why);
     bool remember(const bridge_id& by);
@@ -152,6 +160,7 @@ class bridge final : private sent_requests_events {
     // sent_requests_events
     void on_answer(const bridge_link& on, std::uint64_t id, std::string_view reply, std::string_view taker) override;
     void cancel_at(const bridge_id& taker, std::uint64_t number) override;
+    void on_forgotten(std::uint64_t id) override;
 
     const settings setup_;
     bridge_output& out_;
@@ -159,7 +168,8 @@ class bridge final : private sent_requests_events {
     std::string replaced_; // the instance before
     std::size_t max_message_ = 0;
     bool connected_ = false;
-    bool leaving_ = false;
+    bool leaving_ = false; // takes no more requests
+    bool left_ = false;
     time_point connected_at_{};
     bool pools_may_appear_ = false; // names with their prefix are taken for theirs
     time_point now_{};

@@ -10,6 +10,19 @@ namespace {
 // As for nodes (docs/protocol.md, "Membership").
 time_point lost_at(const pool_table::bridge& b) { return b.heard + b.interval * 7 / 2; }
 
+// The names that no bridge states any more; not the last ones.
+void drop_unstated(pool_table::pool& p) {
+    std::set<std::string_view> stated;
+    for (const auto& [instance, b] : p.bridges) {
+        if (p.names.contains(b.names)) {
+            stated.insert(b.names);
+        }
+    }
+    if (!stated.empty()) {
+        std::erase_if(p.names, [&stated](const auto& each) { return !stated.contains(each.first); });
+    }
+}
+
 std::uint64_t hash_of(std::string_view instance, std::string_view noun) noexcept {
     std::uint64_t hash = 0xcbf29ce484222325U;
     for (const auto text : {instance, noun}) {
@@ -26,22 +39,25 @@ std::uint64_t hash_of(std::string_view instance, std::string_view noun) noexcept
 } // namespace
 
 pool_table::arrival pool_table::on_heartbeat(const bridge_id& from, const heartbeat& said, time_point now) {
+    if (bridge_count_ >= max_bridges && !is_live(from)) {
+        return arrival::ignored;
+    }
     auto found = pools_.find(from.pool);
     if (found == pools_.end()) {
-        if (pools_.size() >= max_pools) {
+        if (pools_.size() >= max_pools && !make_room()) {
             return arrival::ignored;
         }
         found = pools_.emplace(from.pool, pool{}).first;
     }
     auto& bridges = found->second.bridges;
     const auto known = bridges.find(from.instance);
-    if (known == bridges.end() && bridge_count_ >= max_bridges) {
-        return arrival::ignored;
-    }
     const bool fresh = known == bridges.end();
     auto& entry = fresh ? bridges[from.instance] : known->second;
     const auto since = fresh ? now : entry.since;
-    entry = {.node = said.node, .interval = said.interval, .names = said.names, .heard = now, .since = since};
+    const bool knows = found->second.names.contains(said.names);
+    auto names = knows ? said.names : std::move(entry.names);
+    entry = {.node = said.node, .interval = said.interval, .names = std::move(names), .heard = now, .since = since};
+    drop_unstated(found->second);
     if (!fresh) {
         return arrival::known;
     }
@@ -49,11 +65,27 @@ pool_table::arrival pool_table::on_heartbeat(const bridge_id& from, const heartb
     return lost_.erase(from) != 0 ? arrival::returned : arrival::fresh;
 }
 
-bool pool_table::remove(const bridge_id& gone) {
+// For another pool, by forgetting the one that has been without bridges for longest.
+bool pool_table::make_room() {
+    auto oldest = pools_.end();
+    for (auto at = pools_.begin(); at != pools_.end(); ++at) {
+        if (at->second.bridges.empty() &&
+            (oldest == pools_.end() || at->second.without_bridges < oldest->second.without_bridges)) {
+            oldest = at;
+        }
+    }
+    return oldest != pools_.end() && (pools_.erase(oldest), true);
+}
+
+bool pool_table::remove(const bridge_id& gone, time_point now) {
     const auto found = pools_.find(gone.pool);
-    const bool removed = found != pools_.end() && found->second.bridges.erase(gone.instance) != 0;
-    bridge_count_ -= removed ? 1 : 0;
-    return removed;
+    if (found == pools_.end() || found->second.bridges.erase(gone.instance) == 0) {
+        return false;
+    }
+    found->second.without_bridges = now;
+    drop_unstated(found->second);
+    --bridge_count_;
+    return true;
 }
 
 std::vector<bridge_id> pool_table::expire(time_point now) {
@@ -66,7 +98,7 @@ std::vector<bridge_id> pool_table::expire(time_point now) {
         }
     }
     for (const auto& each : gone) {
-        remove(each);
+        remove(each, now);
         if (lost_.size() >= max_bridges) { // the other is then not told
             lost_.clear();
         }
@@ -83,31 +115,66 @@ void pool_table::note_suspension(time_point now) {
     }
 }
 
-void pool_table::clear() {
+void pool_table::clear(time_point now) {
     for (auto& [name, p] : pools_) {
+        p.without_bridges = p.bridges.empty() ? p.without_bridges : now;
         p.bridges.clear();
     }
     lost_.clear();
     bridge_count_ = 0;
 }
 
-bool pool_table::set_names(std::string_view of, node_names said) {
-    const auto found = pools_.find(of);
-    if (found == pools_.end() || found->second.names == said) {
+void pool_table::note_connection(time_point now) {
+    constexpr std::chrono::minutes at_least{1}; // the longest interval between heartbeats
+    for (auto& [name, p] : pools_) {
+        p.without_bridges = std::max(p.without_bridges, now + at_least - kept_for);
+    }
+}
+
+bool pool_table::forget_pools(time_point now) {
+    return std::erase_if(pools_, [now](const auto& each) {
+               return each.second.bridges.empty() && each.second.without_bridges + kept_for <= now;
+           }) != 0;
+}
+
+bool pool_table::set_names(const bridge_id& from, node_names said) {
+    const auto found = pools_.find(from.pool);
+    if (found == pools_.end()) {
+        return false;
+    }
+    auto& p = found->second;
+    const auto by = p.bridges.find(from.instance);
+    if (by == p.bridges.end()) { // it is asked again when its heartbeat has arrived
         return false;
     }
     std::size_t others = 0;
-    for (const auto& [name, p] : pools_) {
-        others += name == of ? 0 : p.names.nodes.size();
+    for (const auto& [name, each] : pools_) {
+        for (const auto& [digest, nodes] : each.names) {
+            others += name == from.pool && (digest == said.digest || digest == by->second.names) ? 0 : nodes.size();
+        }
     }
     said.nodes.resize(std::min(said.nodes.size(), max_names - std::min(others, max_names)));
-    found->second.names = std::move(said);
+    const auto known = p.names.find(said.digest);
+    if (by->second.names == said.digest && known != p.names.end() && known->second == said.nodes) {
+        return false;
+    }
+    by->second.names = said.digest;
+    p.names.insert_or_assign(std::move(said.digest), std::move(said.nodes));
+    drop_unstated(p);
     return true;
 }
 
 bool pool_table::lacks_names(std::string_view of, std::string_view digest) const {
     const auto found = pools_.find(of);
-    return found != pools_.end() && found->second.names.digest != digest;
+    return found != pools_.end() && !found->second.names.contains(digest);
+}
+
+std::size_t pool_table::node_count(const pool& of) {
+    std::set<std::string_view> nodes;
+    for (const auto& [digest, some] : of.names) {
+        nodes.insert(some.begin(), some.end());
+    }
+    return nodes.size();
 }
 
 bool pool_table::is_live(std::string_view name) const {
@@ -123,7 +190,9 @@ bool pool_table::is_live(const bridge_id& which) const {
 std::string_view pool_table::pool_of(std::string_view node, std::string_view except) const {
     std::string_view silent;
     for (const auto& [name, p] : pools_) {
-        if (name == except || !std::ranges::binary_search(p.names.nodes, node, std::less<>{})) {
+        const bool has_it = std::ranges::any_of(
+            p.names, [node](const auto& some) { return std::ranges::binary_search(some.second, node, std::less<>{}); });
+        if (name == except || !has_it) {
             continue;
         }
         if (!p.bridges.empty()) {

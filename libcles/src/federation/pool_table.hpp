@@ -24,17 +24,21 @@ class pool_table {
     static constexpr std::size_t max_pools = 1024;
     static constexpr std::size_t max_bridges = 4096;
     static constexpr std::size_t max_names = 65'536;
+    static constexpr std::chrono::hours kept_for{1}; ///< a pool without bridges
 
     struct bridge {
         std::string node;
         std::chrono::milliseconds interval{0};
-        std::string names; ///< the digest that it states
+        std::string names; ///< the digest of those that it has stated last, and that are known
         time_point heard;
         time_point since; ///< when it was first received
     };
     struct pool {
         std::map<std::string, bridge, std::less<>> bridges; ///< that are live, by instance
-        node_names names;                                   ///< the last that were received
+        /// Names of nodes by their digest: what the bridges have stated, which may know different nodes, or the last
+        /// that were received. The pool has all of these.
+        std::map<std::string, std::vector<std::string>, std::less<>> names;
+        time_point without_bridges; ///< since when, if there is none
     };
     enum class arrival : std::uint8_t {
         known,
@@ -46,18 +50,24 @@ class pool_table {
     /// A bridge says that it lives.
     arrival on_heartbeat(const bridge_id& from, const heartbeat& said, time_point now);
     /// Removes a bridge. Returns false if it is not known.
-    bool remove(const bridge_id& gone);
+    bool remove(const bridge_id& gone, time_point now);
     /// Removes those that were silent for too long, and returns them.
     std::vector<bridge_id> expire(time_point now);
     /// Nothing could be received for a while: silence counts from now on.
     void note_suspension(time_point now);
     /// All bridges are unknown from now on. The pools, and the names of their nodes, remain known.
-    void clear();
+    void clear(time_point now);
+    /// Bridges can be received again. Pools that have none are kept for a while from now on.
+    void note_connection(time_point now);
+    /// Removes the pools that have had no bridge for too long. Returns whether there were any.
+    bool forget_pools(time_point now);
 
-    /// Returns whether anything has changed.
-    bool set_names(std::string_view of, node_names said);
+    /// What that bridge says of its pool. Returns whether anything has changed.
+    bool set_names(const bridge_id& from, node_names said);
     /// Whether the names with that digest are to be asked for.
     [[nodiscard]] bool lacks_names(std::string_view of, std::string_view digest) const;
+    /// How many nodes the pool has.
+    [[nodiscard]] static std::size_t node_count(const pool& of);
 
     [[nodiscard]] bool is_known(std::string_view name) const { return pools_.contains(name); }
     [[nodiscard]] bool is_live(std::string_view name) const;
@@ -71,6 +81,8 @@ class pool_table {
     [[nodiscard]] const std::map<std::string, pool, std::less<>>& pools() const noexcept { return pools_; }
 
   private:
+    bool make_room();
+
     std::map<std::string, pool, std::less<>> pools_;
     std::set<bridge_id> lost_; ///< for lack of heartbeats
     std::size_t bridge_count_ = 0;

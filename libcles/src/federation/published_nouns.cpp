@@ -23,7 +23,9 @@ published_nouns::reply published_nouns::on_reply(std::uint64_t id, bool is_failu
     made.noun = found->first;
     for (auto& who : std::exchange(n.waiting, {})) {
         if (!is_failure) {
-            n.bound.insert(std::move(who.by));
+            if (auto& binds = n.bound[who.by]; binds.size() < max_binds) {
+                binds.insert(who.reply);
+            }
         }
         made.to.push_back(std::move(who.reply));
     }
@@ -49,6 +51,20 @@ bool published_nouns::unbind(const std::string& noun, const bridge_id& by) {
     return true;
 }
 
+std::optional<std::string> published_nouns::cancel(const subscriber& who) {
+    for (auto& [noun, n] : nouns_) {
+        const auto bound = n.bound.find(who.by);
+        const bool was_bound = bound != n.bound.end() && bound->second.erase(who.reply) != 0;
+        if (was_bound && bound->second.empty()) {
+            return unbind(noun, who.by) ? std::optional{noun} : std::nullopt;
+        }
+        if (was_bound || std::erase(n.waiting, who) != 0) { // `on_reply` sees whether somebody is left
+            return {};
+        }
+    }
+    return {};
+}
+
 std::vector<std::string> published_nouns::remove(const bridge_id& by) {
     std::vector<std::string> all;
     for (const auto& [noun, n] : nouns_) {
@@ -61,7 +77,9 @@ std::vector<std::string> published_nouns::remove(const bridge_id& by) {
 std::set<bridge_id> published_nouns::clear() {
     std::set<bridge_id> all;
     for (const auto& [noun, n] : std::exchange(nouns_, {})) {
-        all.insert(n.bound.begin(), n.bound.end());
+        for (const auto& [by, binds] : n.bound) {
+            all.insert(by);
+        }
         for (const auto& who : n.waiting) {
             all.insert(who.by);
         }

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -36,6 +37,9 @@ class published_nouns {
     [[nodiscard]] reply on_reply(std::uint64_t id, bool is_failure);
     /// Returns whether the node is to end the binding, because nobody else has it.
     bool unbind(const std::string& noun, const bridge_id& by);
+    /// Nobody waits any more for the reply to that BIND, which may have been sent. Returns the noun that the node is to
+    /// unbind, if any.
+    std::optional<std::string> cancel(const subscriber& who);
     /// That bridge is lost. Returns the nouns that the node is to unbind.
     std::vector<std::string> remove(const bridge_id& by);
     /// All bindings have ended. Returns those who had them.
@@ -45,10 +49,11 @@ class published_nouns {
     [[nodiscard]] std::size_t size() const noexcept { return nouns_.size(); }
 
   private:
+    static constexpr std::size_t max_binds = 64; // of one bridge and noun; more are not told apart
     struct entry {
-        std::set<bridge_id> bound;
-        std::vector<subscriber> waiting; ///< for the reply
-        std::uint64_t asked = 0;         ///< the id of the BIND that is not answered; 0: none
+        std::map<bridge_id, std::set<std::string>> bound; ///< with the subjects for replies, since it may bind again
+        std::vector<subscriber> waiting;                  ///< for the reply
+        std::uint64_t asked = 0;                          ///< the id of the BIND that is not answered; 0: none
     };
 
     std::map<std::string, entry, std::less<>> nouns_; // "car1:localization/fast"

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "federation/sent_requests.hpp"
 
-#include "protocol/reply_line.hpp"
-
 #include <algorithm>
 #include <utility>
 
@@ -74,6 +72,18 @@ void sent_requests::on_message(std::uint64_t number, std::string_view message) {
     }
 }
 
+void sent_requests::on_unusable(std::uint64_t number, std::string_view message, const protocol::failure& why) {
+    if (const auto taker = take_taker(message); !taker.empty()) {
+        on_message(number, taken_text(taker));
+    }
+    if (const auto found = sent_.find(number); found != sent_.end()) {
+        if (const auto& r = found->second; !r.taker.empty()) { // it may continue there, or be bound
+            events_.cancel_at({r.from.pool, r.taker}, number);
+        }
+        fail(found, why);
+    }
+}
+
 void sent_requests::on_taken(requests::iterator which, std::string_view taker) {
     auto& r = which->second;
     if (r.is_cancelled) {
@@ -100,14 +110,14 @@ void sent_requests::cancel(std::uint64_t id) {
     }
 }
 
-void sent_requests::fail(requests::iterator which, std::string_view why) {
+void sent_requests::fail(requests::iterator which, const protocol::failure& why) {
     const auto failed = std::move(which->second);
     const auto number = which->first;
     erase(sent_.find(number));
     if (!failed.is_cancelled) {
         std::string text;
-        protocol::append_failure(text, {.code = errc::unavailable, .message = std::string{why}});
-        events_.on_answer(failed.from, failed.id, text, {});
+        protocol::append_failure(text, why);
+        events_.on_answer(failed.from, failed.id, text, failed.taker);
     }
 }
 
@@ -120,23 +130,31 @@ void sent_requests::on_lost(const bridge_id& taker, std::string_view why) {
     }
     for (const auto number : lost) {
         if (const auto found = sent_.find(number); found != sent_.end()) {
-            fail(found, why);
+            fail(found, {.code = errc::unavailable, .message = std::string{why}});
         }
     }
 }
 
 void sent_requests::on_time(time_point now) {
     std::vector<std::uint64_t> late;
-    for (auto at = sent_.begin(); at != sent_.end();) {
-        const auto& r = at->second;
-        if (r.forgotten_at <= now) { // the node has given up by itself
-            at = erase(at);
-            continue;
+    std::vector<std::uint64_t> over;
+    for (const auto& [number, r] : sent_) {
+        if (r.forgotten_at <= now) {
+            over.push_back(number);
+        } else if (r.taker.empty() && !r.is_cancelled && r.acknowledged_by <= now) {
+            late.push_back(number);
         }
-        if (r.taker.empty() && !r.is_cancelled && r.acknowledged_by <= now) {
-            late.push_back(at->first);
+    }
+    for (const auto number : over) {
+        const auto found = sent_.find(number);
+        const auto gone = std::move(found->second);
+        erase(found);
+        if (!gone.is_cancelled) { // the node has given up by itself
+            if (!gone.taker.empty()) {
+                events_.cancel_at({gone.from.pool, gone.taker}, number);
+            }
+            events_.on_forgotten(gone.id);
         }
-        ++at;
     }
     for (const auto number : late) {
         const auto found = sent_.find(number);
@@ -146,7 +164,8 @@ void sent_requests::on_time(time_point now) {
         // It remains, so that a bridge that acknowledges it later is told.
         auto waiting = found->second;
         waiting.is_cancelled = true;
-        fail(found, "no bridge of the pool '" + waiting.from.pool + "' acknowledged the request");
+        fail(found, {.code = errc::unavailable,
+                     .message = "no bridge of the pool '" + waiting.from.pool + "' acknowledged the request"});
         sent_.emplace(number, std::move(waiting));
     }
 }

@@ -5,6 +5,7 @@
 
 #include "federation/bridge_link.hpp"
 #include "federation/subject.hpp"
+#include "protocol/reply_line.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -29,6 +30,8 @@ class sent_requests_events {
     virtual void on_answer(const bridge_link& on, std::uint64_t id, std::string_view reply, std::string_view taker) = 0;
     /// That bridge is to cancel the request.
     virtual void cancel_at(const bridge_id& taker, std::uint64_t number) = 0;
+    /// The node's request was not answered until long after its deadline.
+    virtual void on_forgotten(std::uint64_t id) = 0;
 
   protected:
     ~sent_requests_events() = default;
@@ -45,6 +48,8 @@ class sent_requests {
     std::uint64_t add(const bridge_link& from, std::uint64_t id, time_point due, time_point now);
     /// A message for that number from the pool.
     void on_message(std::uint64_t number, std::string_view message);
+    /// The pool has answered, but the message cannot be passed on: the request fails.
+    void on_unusable(std::uint64_t number, std::string_view message, const protocol::failure& why);
     /// The node has cancelled it. A bridge that has not acknowledged it yet is told when it does.
     void cancel(std::uint64_t id);
     /// What that bridge took is not answered any more.
@@ -72,7 +77,7 @@ class sent_requests {
 
     void on_taken(requests::iterator which, std::string_view taker);
     requests::iterator erase(requests::iterator which);
-    void fail(requests::iterator which, std::string_view why);
+    void fail(requests::iterator which, const protocol::failure& why);
     template <class Condition>
     void cancel_if(Condition concerns);
 

@@ -22,6 +22,7 @@ namespace {
 
 constexpr std::size_t events_per_batch = 256;
 constexpr int batches_per_turn = 8;
+constexpr std::size_t reserved_room = 512U << 10U; // of what may wait for NATS, for short messages
 constexpr std::chrono::milliseconds pool_appears_within{2'000};
 
 class dial_errors final : public boost::system::error_category {
@@ -167,6 +168,8 @@ void federated_pools::leave() {
 void federated_pools::stop_if_finished() {
     if (leaving_ && links_.empty() && !std::exchange(stopped_, true)) {
         if (connection_) {
+            bridge_->say_left();
+            connection_->flush();
             connection_->stop();
         }
         if (timer_) {
@@ -340,7 +343,8 @@ void federated_pools::on_timer(boost::system::error_code code) {
 
 void federated_pools::on_event(const event& e) {
     const auto log_once = [this, &e](const std::string& text) {
-        if (std::exchange(last_problem_, e.text) != e.text) {
+        last_problem_ = e.text;
+        if (logged_.add(e.text)) {
             log(log_level::warning, text);
         }
     };
@@ -348,6 +352,7 @@ void federated_pools::on_event(const event& e) {
     case event::kind::connected: {
         log(log_level::info, "connected to NATS, as a bridge of the pool '" + options_.pool + "'");
         last_problem_.clear();
+        logged_.clear();
         connection_->use(e.connection);
         std::random_device random;
         bridge_->on_connected((std::uint64_t{random()} << 32U) | random(), e.max_message, now());
@@ -365,8 +370,9 @@ void federated_pools::on_event(const event& e) {
 
 // -- for the bridge ------------------------------------------------------------------------------------------------
 
-bool federated_pools::publish(std::string subject, std::string reply, std::string message) {
-    return connection_ && connection_->publish(std::move(subject), std::move(reply), std::move(message));
+bool federated_pools::publish(std::string subject, std::string reply, std::string message, room in) {
+    const bool has_room = in == room::reserved || unsent() + reserved_room <= nats_connection::max_unsent;
+    return connection_ && has_room && connection_->publish(std::move(subject), std::move(reply), std::move(message));
 }
 
 void federated_pools::subscribe(std::string subject, bool shared) {
@@ -545,7 +551,7 @@ void federated_pools::write_metrics(json_writer& w) const {
                 w.key("bridges");
                 w.value(std::uint64_t{p.bridges.size()});
                 w.key("nodes");
-                w.value(std::uint64_t{p.names.nodes.size()});
+                w.value(std::uint64_t{bridging::pool_table::node_count(p)});
                 w.end_object();
             }
         }

@@ -5,6 +5,7 @@
 #include <cles/link.hpp>
 
 #include "federation/bridge.hpp"
+#include "federation/logged_problems.hpp"
 #include "nats/nats_connection.hpp"
 #include "nats/pool_link.hpp"
 #include "node/routing/other_pools.hpp"
@@ -69,7 +70,7 @@ class federated_pools final : public core::other_pools,
     };
 
     // bridging::bridge_output
-    bool publish(std::string subject, std::string reply, std::string message) override;
+    bool publish(std::string subject, std::string reply, std::string message, room in) override;
     void subscribe(std::string subject, bool shared) override;
     void unsubscribe(const std::string& subject) override;
     void deliver(const bridging::bridge_link& on, std::string line) override;
@@ -121,7 +122,8 @@ class federated_pools final : public core::other_pools,
     std::deque<event> events_;
     std::vector<std::pair<bridging::bridge_link, std::uint64_t>> refused_; // requests of other pools, by id
     std::list<waiting_dial> dials_;
-    std::string last_problem_; // that was logged
+    std::string last_problem_;
+    bridging::logged_problems logged_; // since it was connected
     std::uint32_t last_link_ = 0;
     std::uint64_t last_dial_ = 0;
     bool claimed_ = false;

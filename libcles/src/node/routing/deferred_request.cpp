@@ -394,7 +394,7 @@ void aggregate_reply::add_pool(std::string_view pool, const node_outcome& found)
         while (reader.next_key(node)) {
             const auto name = std::string{pool}.append(".").append(node);
             std::string_view value;
-            if (reader.read_raw(value)) {
+            if (reader.read_raw(value) && protocol::is_name(node)) { // anything else would have to be escaped
                 begin_member(*into, name);
                 into->append(value);
             }

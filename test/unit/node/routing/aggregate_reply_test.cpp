@@ -40,6 +40,12 @@ BOOST_AUTO_TEST_CASE(what_another_pool_has_replied_is_added_with_its_name) {
         R"("late.all":{"error":"deadline","message":"late.all did not answer in time"}}})");
 }
 
+BOOST_AUTO_TEST_CASE(what_is_no_name_in_the_reply_of_a_pool_is_left_out) {
+    cles::core::aggregate_reply answer;
+    answer.add_pool("north", {.result = R"({"results":{"a\"b":1,"car\n":2,"":3,"car1":4},"errors":{"x y":{}}})"});
+    BOOST_TEST(answer.whole() == R"({"results":{"north.car1":4},"errors":{}})");
+}
+
 BOOST_AUTO_TEST_CASE(pools_without_a_provider_add_nothing) {
     cles::core::aggregate_reply answer;
     answer.add_pool("west", {.failure = failure{.code = cles::errc::no_target, .message = "no known node offers it"}});
