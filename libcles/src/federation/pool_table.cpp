@@ -55,7 +55,7 @@ pool_table::arrival pool_table::on_heartbeat(const bridge_id& from, const heartb
     auto& entry = fresh ? bridges[from.instance] : known->second;
     const auto since = fresh ? now : entry.since;
     const bool knows = found->second.names.contains(said.names);
-    auto names = knows ? said.names : std::move(entry.names);
+    auto names = knows ? said.names : entry.names;
     entry = {.node = said.node, .interval = said.interval, .names = std::move(names), .heard = now, .since = since};
     drop_unstated(found->second);
     if (!fresh) {
