@@ -56,7 +56,8 @@ std::optional<std::string> published_nouns::cancel(const subscriber& who) {
         const auto bound = n.bound.find(who.by);
         const bool was_bound = bound != n.bound.end() && bound->second.erase(who.reply) != 0;
         if (was_bound && bound->second.empty()) {
-            return unbind(noun, who.by) ? std::optional{noun} : std::nullopt;
+            auto ended = noun; // `unbind` may erase it
+            return unbind(ended, who.by) ? std::optional{std::move(ended)} : std::nullopt;
         }
         if (was_bound || std::erase(n.waiting, who) != 0) { // `on_reply` sees whether somebody is left
             return {};
