@@ -11,7 +11,7 @@ namespace {
 
 constexpr int lines_per_turn = 1024;
 
-std::size_t memory_of(const std::string& line) { return line.size() + sizeof line; }
+std::size_t memory_of(const std::string& line) { return line.size() + sizeof(std::string); }
 
 std::string address_of(const bridging::bridge_link& which, const std::string& own_pool) {
     using role = bridging::bridge_link::role;
