@@ -75,14 +75,7 @@ std::string via_of(const protocol::request_line& request, std::string_view from)
 }
 
 bool has_crossed(std::string_view via) noexcept {
-    while (!via.empty()) {
-        const auto comma = via.find(',');
-        if (via.substr(0, comma).ends_with(crossed)) {
-            return true;
-        }
-        via.remove_prefix(comma == std::string_view::npos ? via.size() : comma + 1);
-    }
-    return false;
+    return protocol::any_in_via(via, [](std::string_view node) { return node.ends_with(crossed); });
 }
 
 std::string text_of(verb how, std::string_view node, std::string_view task, std::string_view message) {
@@ -95,15 +88,9 @@ std::string text_of(verb how, std::string_view node, std::string_view task, std:
 }
 
 bool has_passed(std::string_view via, std::string_view pool) noexcept {
-    while (!via.empty()) {
-        const auto comma = via.find(',');
-        const auto node = via.substr(0, comma);
-        if (node.size() > pool.size() && node.starts_with(pool) && node[pool.size()] == '.') {
-            return true;
-        }
-        via.remove_prefix(comma == std::string_view::npos ? via.size() : comma + 1);
-    }
-    return false;
+    return protocol::any_in_via(via, [pool](std::string_view node) {
+        return node.size() > pool.size() && node.starts_with(pool) && node[pool.size()] == '.';
+    });
 }
 
 reply_parts split_reply(std::string_view line) noexcept {

@@ -143,7 +143,20 @@ void append_request(std::string& out, const outgoing_request& request);
 void append_update_head(std::string& out, std::string_view publisher, std::string_view path, std::uint64_t seq,
                         std::string_view epoch);
 
-/// The last of the nodes that have forwarded a request.
+/// Whether that is so of a name in `via`, the comma-separated list of the nodes that have forwarded a request.
+template <class Condition>
+constexpr bool any_in_via(std::string_view via, Condition is_so) {
+    while (!via.empty()) {
+        const auto comma = via.find(',');
+        if (is_so(via.substr(0, comma))) {
+            return true;
+        }
+        via.remove_prefix(comma == std::string_view::npos ? via.size() : comma + 1);
+    }
+    return false;
+}
+
+/// The last of these names.
 constexpr std::string_view last_in_via(std::string_view via) noexcept {
     const auto comma = via.rfind(',');
     return comma == std::string_view::npos ? via : via.substr(comma + 1);

@@ -12,14 +12,7 @@
 namespace cles::core {
 
 bool is_in_via(std::string_view via, std::string_view name) {
-    while (!via.empty()) {
-        const auto comma = via.find(',');
-        if (via.substr(0, comma) == name) {
-            return true;
-        }
-        via.remove_prefix(comma == std::string_view::npos ? via.size() : comma + 1);
-    }
-    return false;
+    return protocol::any_in_via(via, [name](std::string_view node) { return node == name; });
 }
 
 std::string_view requester_of(const node_state& n, const identity& peer, const protocol::request_line& r) {
