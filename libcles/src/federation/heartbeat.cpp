@@ -5,6 +5,7 @@
 #include <cles/json_writer.hpp>
 
 #include "federation/subject.hpp"
+#include "protocol/fnv1a.hpp"
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
@@ -17,12 +18,10 @@ constexpr std::size_t max_depth = 8;
 constexpr std::uint64_t min_interval = 100; // in milliseconds
 constexpr std::uint64_t max_interval = 60'000;
 
-std::uint64_t fnv1a(const std::vector<std::string>& texts) {
-    std::uint64_t hash = 0xcbf29ce484222325U;
-    for (const auto& text : texts) {
-        for (const char c : text + "\n") {
-            hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-        }
+std::uint64_t hash_of(const std::vector<std::string>& names) {
+    auto hash = protocol::fnv1a_basis;
+    for (const auto& name : names) {
+        hash = protocol::fnv1a("\n", protocol::fnv1a(name, hash));
     }
     return hash;
 }
@@ -79,7 +78,7 @@ std::optional<heartbeat> parse_heartbeat(std::string_view text) {
 node_names names_of(std::vector<std::string> nodes) {
     std::ranges::sort(nodes);
     nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-    const auto digest = fnv1a(nodes);
+    const auto digest = hash_of(nodes);
     return {.digest = instance_text(digest), .nodes = std::move(nodes)};
 }
 

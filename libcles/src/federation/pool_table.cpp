@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "federation/pool_table.hpp"
 
+#include "protocol/fnv1a.hpp"
+
 #include <algorithm>
 #include <utility>
 
@@ -24,12 +26,7 @@ void drop_unstated(pool_table::pool& p) {
 }
 
 std::uint64_t hash_of(std::string_view instance, std::string_view noun) noexcept {
-    std::uint64_t hash = 0xcbf29ce484222325U;
-    for (const auto text : {instance, noun}) {
-        for (const char c : text) {
-            hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-        }
-    }
+    auto hash = protocol::fnv1a(noun, protocol::fnv1a(instance));
     // The last characters change only the lower bits so far.
     hash ^= hash >> 33U;
     hash *= 0xff51afd7ed558ccdU;

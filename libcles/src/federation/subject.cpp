@@ -2,6 +2,7 @@
 #include "federation/subject.hpp"
 
 #include "protocol/grammar.hpp"
+#include "protocol/hex_number.hpp"
 
 #include <algorithm>
 #include <array>
@@ -113,19 +114,9 @@ bool is_pool_name(std::string_view text) noexcept {
            !protocol::is_reserved_target(text);
 }
 
-bool is_instance(std::string_view text) noexcept {
-    constexpr std::size_t digits = 16;
-    return text.size() == digits && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
-}
+bool is_instance(std::string_view text) noexcept { return protocol::parse_hex<std::uint64_t>(text).has_value(); }
 
-std::string instance_text(std::uint64_t drawn) {
-    constexpr std::string_view digits = "0123456789abcdef";
-    std::string text(16, '0');
-    for (auto at = text.rbegin(); at != text.rend(); ++at, drawn >>= 4U) {
-        *at = digits[drawn & 0xFU];
-    }
-    return text;
-}
+std::string instance_text(std::uint64_t drawn) { return protocol::hex_text(drawn); }
 
 std::string request_subject(std::string_view pool, verb how, std::string_view node, std::string_view task) {
     return join({pool, token_of(how), encoded(node), encoded(task)});

@@ -3,7 +3,9 @@
 
 #include "json/json_members.hpp"
 #include "node/session/task_execution.hpp"
+#include "protocol/fnv1a.hpp"
 #include "protocol/grammar.hpp"
+#include "protocol/hex_number.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
@@ -255,18 +257,6 @@ void append_announcement(std::string& out, std::string_view node, const signed_a
     out.append("sig=").append(said.sig).append(" ").append(said.body).push_back('\n');
 }
 
-std::string digest_of_tasks(std::string_view json) {
-    constexpr std::uint64_t basis = 0xcbf29ce484222325; // FNV-1a (Fowler, Noll, Vo)
-    constexpr std::uint64_t prime = 0x100000001b3;
-    auto hash = basis;
-    for (const auto c : json) {
-        hash = (hash ^ static_cast<unsigned char>(c)) * prime;
-    }
-    std::string text(16, '0');
-    for (std::size_t i = text.size(); i-- > 0; hash >>= 4U) {
-        text[i] = "0123456789abcdef"[hash & 0xFU];
-    }
-    return text;
-}
+std::string digest_of_tasks(std::string_view json) { return protocol::hex_text(protocol::fnv1a(json)); }
 
 } // namespace cles::core
