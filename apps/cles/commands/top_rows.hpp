@@ -30,7 +30,8 @@ class node_rates {
     using time_point = std::chrono::steady_clock::time_point;
 
     /// \param run identifies a run of a node, because each run counts from 0
-    node_rate update(const std::string& run, const json_node& metrics, time_point now);
+    /// \param document the answer of `cles/metrics`
+    node_rate update(const std::string& run, const json_node& document, time_point now);
 
     /// Removes nodes that have not answered since.
     void remove_before(time_point when);
