@@ -48,7 +48,7 @@ class Faults(unittest.TestCase):
 
     def hold(self, load, name):
         """A job that runs on that node, and does not end."""
-        job = load.send(name, "holds")
+        job = load.send(name, "holds_here")
         load.run(until=lambda: self.fleet.marks()[job.number], what="the job has begun")
         return job
 
@@ -131,7 +131,7 @@ class Faults(unittest.TestCase):
         load.PACE, load.MIX = 0.01, (("any", "once"),)  # far less than three nodes can do
         load.run(0.3)
         for name in ("sat3", "sat3", "sat4", "sat4"):
-            job = load.send(name, "holds", deadline=PATIENCE)
+            job = load.send(name, "holds_here", deadline=PATIENCE)
             load.run(until=lambda number=job.number: self.fleet.marks()[number], what="the job has begun")
         held = lambda name: self.fleet.load_at("sat1", name).get("service_us", 0) >= 100_000
         load.run(until=lambda: held("sat3") and held("sat4"), what="it is known that no worker comes free")

@@ -63,14 +63,16 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
         marks->leave(asked);
         throw std::runtime_error{"as it should"};
     });
-    // Runs until it is stopped.
-    to.on_delegate("holds", [marks](const cles::request& asked, const cles::responder& answer) {
+    // Both run until they are stopped; only the first may move to another node.
+    const auto hold = [marks](const cles::request& asked, const cles::responder& answer) {
         marks->leave(asked);
         while (!answer.stopped()) {
             std::this_thread::sleep_for(2ms);
         }
         answer.fail(cles::errc::cancelled, "nobody waits");
-    });
+    };
+    to.on_delegate("holds", hold);
+    to.on_delegate("holds_here", hold, {.local = true});
 }
 
 } // namespace
