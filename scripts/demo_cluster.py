@@ -348,15 +348,12 @@ def interrupt(number, _):
     raise Interrupted(number)
 
 
-def main():
+def run(show_all, *clusters):
+    """Ends the clusters, whatever happens meanwhile. Returns the exit code."""
     for number in INTERRUPTS:
         signal.signal(number, interrupt)
-    programs = sys.argv[1] if len(sys.argv) > 1 else "build/release/apps"
-    cluster, chain = Cluster(programs), Chain(programs)
     try:
-        below = show_demo(cluster)
-        cluster.end()
-        show_chain(chain, below)
+        show_all(*clusters)
         return 0
     except (Trouble, OSError, ValueError, KeyError, subprocess.TimeoutExpired) as problem:
         print(f"cles: {problem}", file=sys.stderr)
@@ -366,8 +363,19 @@ def main():
     finally:
         for number in INTERRUPTS:
             signal.signal(number, signal.SIG_IGN)
-        cluster.close()
-        chain.close()
+        for cluster in clusters:
+            cluster.close()
+
+
+def show_both(cluster, chain):
+    below = show_demo(cluster)
+    cluster.end()
+    show_chain(chain, below)
+
+
+def main():
+    programs = sys.argv[1] if len(sys.argv) > 1 else "build/release/apps"
+    return run(show_both, Cluster(programs), Chain(programs))
 
 
 if __name__ == "__main__":

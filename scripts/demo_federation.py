@@ -13,12 +13,11 @@ import json
 import os
 import re
 import shutil
-import signal
 import subprocess
 import sys
 import time
 
-from demo_cluster import INTERRUPTS, PATIENCE, Cluster, Interrupted, Link, Trouble, heading, interrupt, patient, show
+from demo_cluster import PATIENCE, Cluster, Link, Trouble, heading, patient, run, show
 
 HUB, GATE, INNER = "hub", "gate", "car1"
 CONFIG = """\
@@ -95,7 +94,7 @@ def show_demo(pools):
         answer = ask(link, "PULL all:prime/7")
         expect(set(answer["results"]) == {f"north.{GATE}", f"north.{INNER}"} and not answer["errors"], answer)
         heading("The other pools: cles ls --pools")
-        show(run(pools, "ls", "--pools", "-o", "table"))
+        show(run_cles(pools, "ls", "--pools", "-o", "table"))
 
         heading("kill -9 for nats-server")
         pools.stop_server()
@@ -110,7 +109,7 @@ def show_demo(pools):
         show(f"{time.monotonic() - begun:.1f} s after the server was started again, requests cross it.")
 
 
-def run(pools, *arguments):
+def run_cles(pools, *arguments):
     running = pools.begin("cles", *arguments, "--at", pools.urls[HUB], stderr=subprocess.PIPE)
     out, err = running.communicate(timeout=PATIENCE)
     if running.returncode != 0:
@@ -124,21 +123,7 @@ def main():
         heading("Two pools, joined by nats-server")
         show("nats-server is not installed, so this part is left out: scripts/setup installs it.")
         return 0
-    for number in INTERRUPTS:
-        signal.signal(number, interrupt)
-    pools = TwoPools(sys.argv[1] if len(sys.argv) > 1 else "build/release/apps", server)
-    try:
-        show_demo(pools)
-        return 0
-    except (Trouble, OSError, ValueError, KeyError, subprocess.TimeoutExpired) as problem:
-        print(f"cles: {problem}", file=sys.stderr)
-        return 1
-    except Interrupted as interrupted:
-        return 128 + interrupted.args[0]
-    finally:
-        for number in INTERRUPTS:
-            signal.signal(number, signal.SIG_IGN)
-        pools.close()
+    return run(show_demo, TwoPools(sys.argv[1] if len(sys.argv) > 1 else "build/release/apps", server))
 
 
 if __name__ == "__main__":
