@@ -15,7 +15,7 @@
 
 namespace cles::bridging {
 
-/// The nouns of this pool that this bridge publishes for others: each is bound once at the node, whoever wants it.
+/// The nouns of this pool that this bridge publishes for others: each is bound once at the node, for all that want it.
 class published_nouns {
   public:
     struct subscriber {
