@@ -21,6 +21,8 @@ std::optional<std::uint16_t> parse_number(std::string_view text, std::uint16_t h
     return code == std::errc{} && ptr == end && value <= highest ? std::optional{value} : std::nullopt;
 }
 
+bool has_only_a_name(std::string_view scheme) { return scheme == "inproc" || scheme == "pool"; }
+
 void parse_host_and_port(std::string_view whole, std::string_view rest, url& out) {
     out.port = default_port;
     if (const auto query = rest.find('?'); query != std::string_view::npos) {
@@ -93,7 +95,7 @@ url parse_url(std::string_view text) {
             refuse(text, "a Unix socket's path has at most 107 bytes");
         }
         out.path = rest;
-    } else if (out.scheme == "inproc" || out.scheme == "pool") {
+    } else if (has_only_a_name(out.scheme)) {
         if (rest.empty()) {
             refuse(text, "the name is missing");
         }
@@ -109,7 +111,7 @@ std::string to_string(const url& u) {
     if (u.scheme == "unix") {
         return text + u.path;
     }
-    if (u.scheme == "inproc" || u.scheme == "pool") {
+    if (has_only_a_name(u.scheme)) {
         return text + u.host;
     }
     if (u.host.find(':') != std::string::npos) {

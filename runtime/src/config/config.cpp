@@ -41,6 +41,21 @@ void check_exposure(const config& setup, const std::string& key, const std::stri
     }
 }
 
+void check_federation(const config& setup) {
+    if (setup.security.is_on()) {
+        throw config_error(setup.location_of("federation"),
+                           "is refused with 'security': what crosses NATS is not sealed");
+    }
+    if (!setup.insecure) {
+        throw config_error(setup.location_of("federation"),
+                           "whoever reaches the NATS server can send requests, which requires 'insecure: true'");
+    }
+    if (!setup.pool.empty() && setup.pool != setup.federation.pool) {
+        throw config_error(setup.location_of("federation.pool"),
+                           "'" + setup.federation.pool + "' is another pool than 'pool: " + setup.pool + "'");
+    }
+}
+
 } // namespace
 
 std::string config::location_of(const std::string& key) const {
@@ -117,17 +132,8 @@ void check(const config& setup) {
                            "'" + setup.multicast.interface +
                                "' can be reached from other hosts, which requires 'insecure: true'");
     }
-    if (setup.federation.is_on() && !setup.insecure && !setup.security.is_on()) {
-        throw config_error(setup.location_of("federation"),
-                           "whoever reaches the NATS server can send requests, which requires 'insecure: true'");
-    }
-    if (setup.federation.is_on() && setup.security.is_on()) {
-        throw config_error(setup.location_of("federation"),
-                           "is refused with 'security': what crosses NATS is not sealed");
-    }
-    if (setup.federation.is_on() && !setup.pool.empty() && setup.pool != setup.federation.pool) {
-        throw config_error(setup.location_of("federation.pool"),
-                           "'" + setup.federation.pool + "' is another pool than 'pool: " + setup.pool + "'");
+    if (setup.federation.is_on()) {
+        check_federation(setup);
     }
     if (setup.peers.contains(setup.node)) {
         throw config_error(setup.location_of("peers." + setup.node), "is this node's own name");
