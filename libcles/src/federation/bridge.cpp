@@ -7,6 +7,7 @@
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace cles::bridging {
@@ -23,9 +24,10 @@ constexpr std::chrono::seconds optimistic{1}; // after connecting, a pool that i
 constexpr std::chrono::minutes between_drop_logs{1};
 constexpr std::uint32_t upstream_keep = 1024;
 constexpr std::chrono::seconds remembered_for{10}; // after a bridge is lost, or before it is known
-constexpr std::size_t max_strange = 1024;
+constexpr std::size_t max_not_live = 1024;
 constexpr std::size_t max_short = 1024; // of a failure for which room is reserved
 
+constexpr std::array all_verbs{verb::pull, verb::push, verb::delegate, verb::bind, verb::update};
 constexpr std::string_view cancel_path = "cles/cancel/";
 constexpr std::string_view lost_line = "PUSH self:cles/lost";
 constexpr std::string_view names_line = "PULL self:cles/names";
@@ -36,17 +38,9 @@ std::string_view without_pool(std::string_view target, std::string_view pool) {
     return has_it ? target.substr(pool.size() + 1) : target;
 }
 
-std::string failure_text(const protocol::failure& why) {
-    std::string text;
-    protocol::append_failure(text, why);
-    return text;
+std::string noun_of(const protocol::request_line& r) {
+    return std::string{r.noun.target}.append(":").append(r.noun.path);
 }
-
-std::string with_id(std::uint64_t id, std::string_view rest) {
-    return "id=" + std::to_string(id) + " " + std::string{rest};
-}
-
-bool is_error_reply(std::string_view rest) { return protocol::is_failure(rest); }
 
 } // namespace
 
@@ -66,7 +60,7 @@ void bridge::on_connected(std::uint64_t drawn, std::size_t max_message, time_poi
     out_.subscribe(std::string{heartbeat_filter}, false);
     out_.subscribe(std::string{names_filter}, false);
     if (!leaving_) {
-        for (const auto how : {verb::pull, verb::push, verb::delegate, verb::bind, verb::update}) {
+        for (const auto how : all_verbs) {
             out_.subscribe(request_filter(setup_.pool, how), true);
         }
     }
@@ -85,7 +79,7 @@ void bridge::on_disconnected(std::string_view why) {
     const auto text = "the connection to NATS was lost: " + std::string{why};
     sent_.clear();
     taken_.clear();
-    strange_.clear();
+    not_live_.clear();
     feeds_.clear();
     published_.clear();
     asked_names_.clear();
@@ -97,7 +91,7 @@ void bridge::on_disconnected(std::string_view why) {
 
 void bridge::leave() {
     if (!std::exchange(leaving_, true) && connected_) {
-        for (const auto how : {verb::pull, verb::push, verb::delegate, verb::bind, verb::update}) {
+        for (const auto how : all_verbs) {
             out_.unsubscribe(request_filter(setup_.pool, how));
         }
     }
@@ -137,7 +131,7 @@ void bridge::on_time(time_point now) {
     if (pools_.forget_pools(now)) {
         out_.on_pools_changed();
     }
-    std::erase_if(strange_, [&](const auto& each) {
+    std::erase_if(not_live_, [&](const auto& each) {
         const bool is_over = each.second <= now;
         if (is_over && !pools_.is_live(each.first)) {
             taken_.forget(each.first);
@@ -312,9 +306,7 @@ void bridge::on_control(std::string_view reply, std::string_view message, time_p
         return;
     }
     if (r.verb == verb::bind && r.unbinds()) {
-        std::string noun{r.noun.target};
-        noun.append(":").append(r.noun.path);
-        if (published_.unbind(noun, by)) {
+        if (const auto noun = noun_of(r); published_.unbind(noun, by)) {
             end_published(noun);
         }
     } else if (r.verb == verb::bind) {
@@ -351,7 +343,7 @@ void bridge::on_lost(const bridge_id& gone, std::string_view why) {
         cancel_taken(id);
         taken_.remove(id);
     }
-    strange_.insert_or_assign(gone, now_ + remembered_for); // copies of its requests may still arrive
+    not_live_.insert_or_assign(gone, now_ + remembered_for); // copies of its requests may still arrive
     for (const auto& noun : published_.remove(gone)) {
         end_published(noun);
     }
@@ -380,7 +372,7 @@ void bridge::check_own_pool(time_point now) {
     }
     for (const auto& [instance, b] : own->second.bridges) {
         if (instance != self_.instance && b.since + at_home_within <= now && b.node != setup_.node &&
-            !std::ranges::binary_search(home_.nodes, b.node) && strangers_.insert(b.node).second) {
+            !std::ranges::binary_search(home_.nodes, b.node) && warned_of_.insert(b.node).second) {
             out_.log(log_level::warning, "the bridge of '" + b.node + "' is of the pool '" + setup_.pool +
                                              "' too, but that node is not known here: if it is at another site, give "
                                              "that another pool's name");
@@ -446,12 +438,14 @@ void bridge::on_closed(const bridge_link& which) {
 }
 
 void bridge::answer(const bridge_link& on, std::uint64_t id, std::string_view reply) {
-    out_.deliver(on, with_id(id, reply));
+    std::string line;
+    protocol::append_reply_head(line, id);
+    out_.deliver(on, std::move(line.append(reply)));
 }
 
 void bridge::refuse(const bridge_link& on, std::uint64_t id, const protocol::failure& why) {
     if (id != 0) {
-        answer(on, id, failure_text(why));
+        answer(on, id, protocol::failure_text(why));
     }
 }
 
@@ -498,25 +492,23 @@ void bridge::send_request(const bridge_link& from, std::string_view line, time_p
 void bridge::publish_request(const bridge_link& from, const protocol::request_line& r, time_point now) {
     const auto& pool = from.pool;
     const auto number = sent_.add(from, r.id, now + milliseconds{r.deadline_ms}, now);
+    const auto fail = [&](const protocol::failure& why) { sent_.on_message(number, protocol::failure_text(why)); };
     if (has_crossed(r.via)) { // a node of that name in another pool is not the one that was meant
-        sent_.on_message(number,
-                         failure_text({.code = errc::no_target,
-                                       .message = "a request from another pool is not sent on to '" + pool + "'"}));
+        fail({.code = errc::no_target, .message = "a request from another pool is not sent on to '" + pool + "'"});
         return;
     }
     auto message = pool == setup_.pool ? message_within_pool(r) : message_of(r, setup_.pool);
     if (message.size() > max_message_) {
-        sent_.on_message(number, failure_text({.code = errc::too_large,
-                                               .message = "a request through NATS has at most " +
-                                                          std::to_string(max_message_) + " bytes here"}));
+        fail({.code = errc::too_large,
+              .message = "a request through NATS has at most " + std::to_string(max_message_) + " bytes here"});
         return;
     }
     ++figures_.requests_sent;
     if (!out_.publish(request_subject(pool, r.verb, without_pool(r.noun.target, pool), r.noun.task),
                       reply_subject(self_, number), std::move(message), bridge_output::room::shared)) {
-        sent_.on_message(number, failure_text({.code = errc::busy,
-                                               .message = "too much waits to be sent to NATS",
-                                               .retry_ms = protocol::default_retry_ms}));
+        fail({.code = errc::busy,
+              .message = "too much waits to be sent to NATS",
+              .retry_ms = protocol::default_retry_ms});
     }
 }
 
@@ -572,7 +564,7 @@ void bridge::on_answer(const bridge_link& on, std::uint64_t id, std::string_view
     if (bind.empty()) {
         return;
     }
-    if (is_error_reply(reply)) {
+    if (protocol::is_failure(reply)) {
         if (const auto gone = feeds_.remove(id)) {
             unsubscribe_if_last(*gone);
         }
@@ -608,7 +600,7 @@ void bridge::publish_short(std::string subject, std::string message) {
 
 void bridge::refuse_foreign(const std::string& reply, const protocol::failure& why) {
     if (!reply.empty()) {
-        publish_short(reply, failure_text(why));
+        publish_short(reply, protocol::failure_text(why));
     }
 }
 
@@ -673,10 +665,10 @@ bool bridge::remember(const bridge_id& by) {
     if (pools_.is_live(by)) {
         return true;
     }
-    if (strange_.size() >= max_strange && !strange_.contains(by)) {
+    if (not_live_.size() >= max_not_live && !not_live_.contains(by)) {
         return false;
     }
-    strange_.insert_or_assign(by, now_ + remembered_for);
+    not_live_.insert_or_assign(by, now_ + remembered_for);
     return true;
 }
 
@@ -703,7 +695,7 @@ void bridge::send_reply(std::string_view line) {
     }
     if (!r->reply.empty()) {
         if (parts.rest.size() <= max_message_) {
-            if (is_error_reply(parts.rest) && parts.rest.size() <= max_short) {
+            if (protocol::is_failure(parts.rest) && parts.rest.size() <= max_short) {
                 publish_short(r->reply, std::string{parts.rest});
             } else if (!publish(r->reply, std::string{parts.rest}) && !parts.is_interim) {
                 refuse_foreign(r->reply, {.code = errc::busy,
@@ -736,8 +728,7 @@ void bridge::take_bind(const protocol::request_line& r, const taken_requests::re
                                   .retry_ms = static_cast<std::uint64_t>(setup_.interval.count())});
         return;
     }
-    std::string noun{r.noun.target};
-    noun.append(":").append(r.noun.path);
+    const auto noun = noun_of(r);
     const auto publisher = pools_.publisher_of(setup_.pool, noun);
     if (!is_passed_on && publisher != self_.instance && !publisher.empty()) {
         out_.publish(control_subject({setup_.pool, std::string{publisher}}), by.reply,
@@ -759,10 +750,10 @@ void bridge::send_bind_reply(std::string_view line) {
     if (parts.id == 0) {
         return;
     }
-    const auto answered = published_.on_reply(parts.id, is_error_reply(parts.rest));
+    const auto answered = published_.on_reply(parts.id, protocol::is_failure(parts.rest));
     for (const auto& to : answered.to) {
         const auto taken = taken_text(self_.instance) + " ";
-        if (is_error_reply(parts.rest) && parts.rest.size() <= max_short) {
+        if (protocol::is_failure(parts.rest) && parts.rest.size() <= max_short) {
             publish_short(to, taken + std::string{parts.rest});
         } else if (parts.rest.size() + max_pool_name > max_message_ || !publish(to, taken + std::string{parts.rest})) {
             publish_short(to, taken + "{}"); // it is bound nevertheless, without a value

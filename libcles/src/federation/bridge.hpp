@@ -184,12 +184,12 @@ class bridge final : private sent_requests_events {
     pool_table pools_;
     sent_requests sent_;
     taken_requests taken_;
-    std::map<bridge_id, time_point> strange_; // that have asked and are not live, and when they are forgotten
+    std::map<bridge_id, time_point> not_live_; // that have asked and are not live, and when they are forgotten
     foreign_feeds feeds_;
     std::map<std::uint64_t, foreign_noun> binds_; // that are not answered, by the node's id
     published_nouns published_;
     std::map<bridge_id, time_point> asked_names_; // and when
-    std::set<std::string> strangers_;             // bridges of the own pool that are not at home, and were logged
+    std::set<std::string> warned_of_;             // bridges of the own pool that are not at home, and were logged
     figures figures_;
 };
 

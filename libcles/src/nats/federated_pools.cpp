@@ -375,19 +375,22 @@ bool federated_pools::publish(std::string subject, std::string reply, std::strin
     return connection_ && has_room && connection_->publish(std::move(subject), std::move(reply), std::move(message));
 }
 
-void federated_pools::subscribe(std::string subject, bool shared) {
-    const bool is_feed = bridging::parse_subject(subject).kind == bridging::subject_kind::feed;
-    connection_->subscribe(std::move(subject), shared ? std::string{bridging::queue_group} : std::string{}, is_feed);
-    if (!running_) {
+// `run` does it once for all.
+void federated_pools::flush() {
+    if (!running_ && connection_) {
         connection_->flush();
     }
 }
 
+void federated_pools::subscribe(std::string subject, bool shared) {
+    const bool is_feed = bridging::parse_subject(subject).kind == bridging::subject_kind::feed;
+    connection_->subscribe(std::move(subject), shared ? std::string{bridging::queue_group} : std::string{}, is_feed);
+    flush();
+}
+
 void federated_pools::unsubscribe(const std::string& subject) {
     connection_->unsubscribe(subject);
-    if (!running_) {
-        connection_->flush();
-    }
+    flush();
 }
 
 void federated_pools::deliver(const bridge_link& on, std::string line) {
@@ -429,7 +432,8 @@ bool federated_pools::refuse(const bridge_link& on, std::string_view line) {
 // As the node's replies, before the bridge acknowledges the requests of this batch.
 void federated_pools::answer_refused() {
     for (const auto& [on, id] : std::exchange(refused_, {})) {
-        auto reply = "id=" + std::to_string(id) + " ";
+        std::string reply;
+        protocol::append_reply_head(reply, id);
         protocol::append_failure(reply, {.code = errc::busy,
                                          .message = "too many requests of other pools wait at this bridge",
                                          .retry_ms = protocol::default_retry_ms});
@@ -518,9 +522,7 @@ void federated_pools::on_closed(pool_link& which) {
         const auto keep = found->second;
         links_.erase(found);
         bridge_->on_closed(which.which());
-        if (!running_ && connection_) {
-            connection_->flush();
-        }
+        flush();
     }
     stop_if_finished();
 }

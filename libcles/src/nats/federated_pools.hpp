@@ -93,6 +93,7 @@ class federated_pools final : public core::other_pools,
     void take_events();
     void on_event(const event& e);
     void run_later();
+    void flush();
     void run();
     void run_batches();
     void hand_over_all();

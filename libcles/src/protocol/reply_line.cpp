@@ -94,6 +94,12 @@ bool parse_failure(std::string_view body, failure& out) {
     return reader.at_end();
 }
 
+std::string failure_text(const failure& f) {
+    std::string text;
+    append_failure(text, f);
+    return text;
+}
+
 void append_failure(std::string& out, const failure& f) {
     if (!f.answer.empty()) {
         out.append(f.answer);

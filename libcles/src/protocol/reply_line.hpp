@@ -54,6 +54,7 @@ struct failure {
 /// Appends a failure's body; a forwarded one unchanged. `ran` is written if it is true, `retry_ms` if it is set, and
 /// always with `busy`.
 void append_failure(std::string& out, const failure& f);
+[[gnu::cold]] std::string failure_text(const failure& f);
 
 /// Appends "id=7 ", or nothing for 0.
 void append_reply_head(std::string& out, std::uint64_t id);

@@ -40,6 +40,14 @@ bool permits(const node_state& n, std::string_view requester, std::string_view p
     return protocol::parse_noun(whole, noun, why) && permits(n, requester, provider, how, noun);
 }
 
+bool may_forward_for(const node_state& n, std::string_view requester) {
+    return !n.security || requester == n.name || n.security->may_forward(n.name, requester);
+}
+
+std::string how_to_permit_forwarding(const node_state& n, std::string_view requester) {
+    return "(cles fleet rights " + n.name + " --forwards " + std::string{requester} + ")";
+}
+
 namespace {
 
 // Requests that every member may send: they concern its own link, or security itself.
@@ -50,10 +58,6 @@ bool is_exempt(const protocol::noun_view& noun) noexcept {
     const auto what = noun.parameters.front();
     return what == "cancel" || what == "roster" || what == "hello" || what == "announced" || what == "leaving" ||
            what == "slots";
-}
-
-bool may_forward_for(const node_state& n, std::string_view requester) {
-    return requester == n.name || n.security->may_forward(n.name, requester);
 }
 
 // For `any` and `all`, the rights are checked for each node that is asked.
@@ -78,7 +82,7 @@ std::string denial(const node_state& n, const identity& peer, const protocol::re
         !requester.empty() && !protocol::is_reserved_target(r.noun.target) && !is_local_target(n, r);
     if (is_for_another && n.security->is_member(requester) && !may_forward_for(n, requester)) {
         return n.name + " may not forward requests of " + std::string{requester} + " to " + std::string{r.noun.target} +
-               " (cles fleet rights " + n.name + " --forwards " + std::string{requester} + ")";
+               " " + how_to_permit_forwarding(n, requester);
     }
     return n.name + " does not allow " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.task} + "'";
 }
@@ -197,12 +201,6 @@ std::optional<protocol::failure> no_capacity_to_run(const node_state& n) {
 protocol::failure after_run(protocol::failure why) {
     why.ran = why.code == errc::too_large || why.code == errc::no_target || why.code == errc::no_task;
     return why;
-}
-
-std::string failure_text(const protocol::failure& why) {
-    std::string text;
-    protocol::append_failure(text, why);
-    return text;
 }
 
 } // namespace cles::core

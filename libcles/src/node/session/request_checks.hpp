@@ -29,7 +29,7 @@ std::optional<protocol::failure> no_capacity_to_run(const node_state& n);
 /// repeat its effect. (`busy` is the handler's own promise that it has done nothing.)
 [[gnu::cold]] protocol::failure after_run(protocol::failure why);
 
-[[gnu::cold]] std::string failure_text(const protocol::failure& why);
+using protocol::failure_text;
 
 // -- checks before a request is served -----------------------------------------------------------------------------
 
@@ -46,6 +46,11 @@ bool permits(const node_state& n, std::string_view requester, std::string_view p
 /// The same for a path of `provider`, such as that of a topic.
 bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
              std::string_view path);
+
+/// Whether this node may forward for the requester; itself, and without security, for all.
+bool may_forward_for(const node_state& n, std::string_view requester);
+/// How to permit that: "(cles fleet rights car1 --forwards sat1)".
+[[gnu::cold]] std::string how_to_permit_forwarding(const node_state& n, std::string_view requester);
 
 /// Whether the access rules allow the request.
 bool allows(const node_state& n, const identity& peer, const protocol::request_line& request);

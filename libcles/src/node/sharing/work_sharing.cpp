@@ -89,7 +89,7 @@ std::unique_ptr<const movable_request> work_sharing::movable(const protocol::req
 }
 
 bool work_sharing::may_forward_for(std::string_view requester) {
-    if (requester.empty() || requester == node_.name || node_.security->may_forward(node_.name, requester)) {
+    if (requester.empty() || core::may_forward_for(node_, requester)) {
         return true;
     }
     const auto* const others = out_.registry();
@@ -97,8 +97,7 @@ bool work_sharing::may_forward_for(std::string_view requester) {
         has_logged_why_ = true;
         const std::string who{requester};
         node_.post_log(log_level::info, "jobs of " + who + " do not move to other nodes, because " + node_.name +
-                                            " may not forward for it (cles fleet rights " + node_.name +
-                                            " --forwards " + who + ")");
+                                            " may not forward for it " + how_to_permit_forwarding(node_, requester));
     }
     return false;
 }
