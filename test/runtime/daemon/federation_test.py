@@ -8,16 +8,10 @@ import time
 import unittest
 from pathlib import Path
 
-from daemon import DEFAULTS, PLUGINS, Daemon, Folder, body, clesd
-from fleet import COUNTING
-from nats import SERVER, NatsServer
+from bridges import BridgesTest, pool_of
+from daemon import DEFAULTS, body, clesd
+from nats import SERVER
 from support import PATIENCE, cles, wait_until
-
-
-def pool_of(daemon):
-    """What it says of its bridge; `pools`: how many others can be reached."""
-    found = json.loads(daemon.ask("PULL self:cles/metrics"))["federation"]
-    return {**found, "pools": sum(pool["state"] == "live" for pool in found.get("pools", []))}
 
 
 def is_stopped(process):
@@ -28,36 +22,12 @@ def is_stopped(process):
     return set(states) == {"T"}
 
 
-class Federation(unittest.TestCase):
-    def setUp(self):
-        self.folder = Folder()
-        self.addCleanup(self.folder.__exit__)
-        self.marks = self.folder.write("", "marks")
-
-    def server(self, more=""):
-        server = NatsServer(more)
-        self.addCleanup(server.__exit__)
-        return server
-
-    def node(self, name, pool, server, more="", federation="", has_work=True, url=None):
-        """A daemon with the tasks of the plugin system, and usually of primes and counting, which is a bridge if there
-        is a server."""
-        work = f", {PLUGINS}/libcles-primes.so, {{path: {COUNTING}, config: {{marks: {self.marks}}}}}" if has_work else ""
-        plugins = f"plugins: [{PLUGINS}/libcles-system.so{work}]\n"
-        bridge = f"insecure: true\nfederation: {{nats: '{url or server.url}', pool: {pool}{federation}}}\n" if server else f"pool: {pool}\n"
-        node = Daemon(plugins + bridge + "drain: 300ms\n" + more, base=DEFAULTS.replace("sat1", name))
-        self.addCleanup(node.__exit__)
-        return node
-
+class Federation(BridgesTest):
     def two_pools(self, more=""):
         server = self.server(more)
         hub, gate = self.node("hub", "south", server), self.node("gate", "north", server)
         self.wait_for_pools(hub, gate)
         return server, hub, gate
-
-    def wait_for_pools(self, *nodes):
-        for node in nodes:
-            wait_until(lambda node=node: pool_of(node)["pools"] == len({id(n) for n in nodes}) - 1, "pools are known")
 
     def count_marks(self, number):
         return [line.split()[0] for line in self.folder.read("marks").splitlines()].count(str(number))
@@ -394,11 +364,6 @@ class Federation(unittest.TestCase):
         self.assertNotIn("failure", nodes[1])
         _, out, _ = cles("top", "-n", "1", "--at", hub.url, "-o", "json")
         self.assertEqual([node["node"] for node in json.loads(out)["nodes"]], ["hub"])
-
-    def diagnosis(self, node):
-        """What `cles doctor` finds about the node's connection to NATS, as verdict and text."""
-        _, out, _ = cles("doctor", "--at", node.url, "-o", "json")
-        return [(each["verdict"], each["text"]) for each in json.loads(out)["findings"] if each["check"] == "federation"]
 
     def test_doctor_examines_the_connection(self):
         server, hub, gate = self.two_pools()
