@@ -26,8 +26,8 @@ struct federation_options {
     std::string credentials{};
     /// A file whose first line is a token; empty: none.
     std::string token{};
-    /// Files for TLS, in PEM: the authorities that are trusted, and the own certificate with its key. With an
-    /// authority, TLS is required, whatever the URL.
+    /// Files for TLS, in PEM: the authorities that are trusted instead of those of the system, and the own
+    /// certificate with its key. With either, TLS is required, whatever the URL.
     std::string tls_authority{};
     std::string tls_certificate{};
     std::string tls_key{};
@@ -35,8 +35,9 @@ struct federation_options {
 
 /// The bridge of one service, for `service_options::federation`. It starts one thread, which connects to NATS, and
 /// connects again whenever the connection is lost; the thread ends when the service is destroyed, which waits for
-/// it: up to 200 ms for what is left to send, and while it connects, up to one second for each server and as long as
-/// the system takes to look up its name. The files are read at each connection. The service has to route
+/// it: up to 200 ms for what is left to send, and while it connects, up to one second for each server, with TLS one
+/// more for each message of the handshake, and as long as the system takes to look up its name. The files are read at
+/// each connection. The service has to route
 /// (`cles::routing`) to serve requests of other pools for other nodes.
 /// It needs `service_options::insecure`: everybody who may publish to NATS can send requests.
 ///

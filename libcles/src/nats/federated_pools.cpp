@@ -344,7 +344,7 @@ void federated_pools::on_timer(boost::system::error_code code) {
 void federated_pools::on_event(const event& e) {
     const auto log_once = [this, &e](const std::string& text) {
         last_problem_ = e.text;
-        if (logged_.add(e.text)) {
+        if (logged_.add(text)) {
             log(log_level::warning, text);
         }
     };

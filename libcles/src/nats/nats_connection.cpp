@@ -10,6 +10,8 @@
 #include <array>
 #include <cerrno>
 #include <fstream>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <poll.h>
@@ -21,8 +23,8 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr std::int64_t connect_timeout = 1'000; // milliseconds, of one server
-constexpr std::int64_t ping_interval = 2'000;   // milliseconds
+constexpr milliseconds connect_timeout{1'000}; // of one server
+constexpr std::int64_t ping_interval = 2'000;  // milliseconds
 constexpr int max_pings_out = 2;
 constexpr milliseconds first_pause{250};
 constexpr milliseconds longest_pause{1'000};
@@ -65,16 +67,36 @@ void with(void* number, F f) {
 
 std::string last_error(natsStatus code) {
     const char* const words = nats_GetLastError(nullptr);
-    std::string text = words != nullptr && *words != '\0' ? words : natsStatus_GetText(code);
-    return text.empty() ? std::string{natsStatus_GetText(code)} : text;
+    std::string_view text = words != nullptr && *words != '\0' ? words : natsStatus_GetText(code);
+    constexpr std::string_view end_of_place = "): "; // in the library's sources
+    if (const auto end = text.find(end_of_place); text.starts_with('(') && end != std::string_view::npos) {
+        text.remove_prefix(end + end_of_place.size());
+    }
+    return std::string{text};
 }
 
-// The library does not pass on what a server says that accepts no more connections.
+// The library does not pass on everything that it is told.
 std::string refusal(std::string said) {
     if (said.find("Expected 'PONG', got ''") != std::string::npos) {
-        return "the server ended the connection at once: it may have its maximum of connections (" + said + ")";
+        const auto why = tls_watch::last_error(); // a certificate is refused after the handshake
+        return why.empty() ? "the server ended the connection at once: it may have its maximum of connections"
+                           : "the server ended the connection at once: " + why;
+    }
+    if (said.find("SSL handshake error: (null)") != std::string::npos) {
+        return "SSL handshake error: the server does not answer";
+    }
+    if (said == "SSL_write error: (null)" || said == "SSL_read error: (null)") {
+        return "the server ended the connection after the TLS handshake: it may not accept the certificate, or miss "
+               "one";
     }
     return said;
+}
+
+// Empty if it can be read.
+std::string why_unreadable(const std::string& file) {
+    errno = 0;
+    const std::ifstream opened{file};
+    return opened ? std::string{} : "cannot read " + file + ": " + std::generic_category().message(errno);
 }
 
 std::string to_text(const char* text) { return text == nullptr ? std::string{} : std::string{text}; }
@@ -149,7 +171,7 @@ struct nats_connection::callbacks {
 
 nats_connection::nats_connection(server_options options, std::function<void()> wake)
     : options_(std::move(options)), number_(enter(this)), wake_descriptor_(make_descriptor()), wake_(std::move(wake)),
-      thread_([this] { run(); }) {}
+      tls_(connect_timeout), thread_([this] { run(); }) {}
 
 nats_connection::~nats_connection() {
     stop();
@@ -282,7 +304,7 @@ void nats_connection::pause(milliseconds time) {
 }
 
 // Returns why it cannot be done; empty if it can.
-std::string nats_connection::configure(natsOptions* made) const {
+std::string nats_connection::configure(natsOptions* made) {
     std::vector<const char*> servers;
     bool is_secure = !options_.tls_authority.empty() || !options_.tls_certificate.empty();
     for (const auto& server : options_.servers) {
@@ -290,11 +312,17 @@ std::string nats_connection::configure(natsOptions* made) const {
         is_secure = is_secure || server.starts_with("tls://");
     }
     auto* const self = reinterpret_cast<void*>(number_); // NOLINT(performance-no-int-to-ptr): found in the registry
+    for (const auto* file : {&options_.token, &options_.credentials, &options_.tls_authority, &options_.tls_certificate,
+                             &options_.tls_key}) {
+        if (auto why = file->empty() ? std::string{} : why_unreadable(*file); !why.empty()) {
+            return why;
+        }
+    }
     std::string token;
     if (!options_.token.empty()) {
         std::ifstream file{options_.token};
         if (!std::getline(file, token) || token.empty()) {
-            return "cannot read a token from " + options_.token;
+            return "cannot read a token from " + options_.token + ": its first line is empty";
         }
     }
     const auto check = [](natsStatus code, const std::string& what) {
@@ -308,7 +336,7 @@ std::string nats_connection::configure(natsOptions* made) const {
     };
     step(natsOptions_SetServers(made, servers.data(), static_cast<int>(servers.size())), "the URL of a server");
     step(natsOptions_SetName(made, options_.name.c_str()), "the name");
-    step(natsOptions_SetTimeout(made, connect_timeout), "the time limit");
+    step(natsOptions_SetTimeout(made, connect_timeout.count()), "the time limit");
     // Otherwise a thread of the library asks for it a millisecond later. `apply_commands` writes once for many.
     step(natsOptions_SetSendAsap(made, true), "the buffer");
     step(natsOptions_SetAllowReconnect(made, false), "the connection"); // it would send again what was not sent
@@ -326,6 +354,9 @@ std::string nats_connection::configure(natsOptions* made) const {
     if (!options_.credentials.empty()) {
         step(natsOptions_SetUserCredentialsFromFiles(made, options_.credentials.c_str(), nullptr),
              options_.credentials);
+    }
+    if (why.empty() && !tls_.prepare(made, options_.tls_authority.empty())) {
+        why = "cannot prepare TLS";
     }
     if (is_secure) {
         step(natsOptions_SetSecure(made, true), "TLS");
@@ -375,7 +406,7 @@ std::string nats_connection::serve() {
         const bool wants_read = wants_more();
         std::array<pollfd, 2> waited{pollfd{.fd = wake_descriptor_, .events = POLLIN, .revents = 0},
                                      pollfd{.fd = socket_,
-                                            .events = static_cast<short>((wants_read ? POLLIN : 0) |
+                                            .events = static_cast<short>((wants_read ? POLLIN | POLLRDHUP : 0) |
                                                                          (wants_write_ || !all_applied ? POLLOUT : 0)),
                                             .revents = 0}};
         if (::poll(waited.data(), waited.size(), -1) < 0 && errno != EINTR) {
@@ -385,7 +416,9 @@ std::string nats_connection::serve() {
             std::uint64_t ignored = 0;
             static_cast<void>(::read(wake_descriptor_, &ignored, sizeof ignored));
         }
-        if ((waited[1].revents & (POLLIN | POLLHUP | POLLERR)) != 0) {
+        const bool has_ended = (waited[1].revents & (POLLHUP | POLLERR | POLLRDHUP)) != 0;
+        const bool is_readable = (waited[1].revents & POLLIN) != 0;
+        if (has_ended || (is_readable && (!tls_.is_used() || tls_.has_record(socket_)))) {
             natsConnection_ProcessReadEvent(connection_);
             collect();
         }
@@ -431,10 +464,16 @@ bool nats_connection::apply_commands() {
             bytes += c.size();
         }
         queued_ -= bytes;
-        if (wants_write_) {
+        if (wants_write_ && takes_more()) {
             natsConnection_ProcessWriteEvent(connection_);
         }
     }
+}
+
+// Whether a write returns at once.
+bool nats_connection::takes_more() const {
+    pollfd waited{.fd = socket_, .events = POLLOUT, .revents = 0};
+    return !tls_.is_used() || ::poll(&waited, 1, 0) > 0;
 }
 
 void nats_connection::apply(const command& c) {

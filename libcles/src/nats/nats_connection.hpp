@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "nats/tls_watch.hpp"
+
 #include <atomic>
 #include <chrono>
 #include <cstddef>
@@ -100,7 +102,7 @@ class nats_connection {
 
     void run();
     std::string connect();
-    std::string configure(__natsOptions* made) const;
+    std::string configure(__natsOptions* made);
     std::string serve();
     bool apply_commands();
     void apply(const command& c);
@@ -114,6 +116,7 @@ class nats_connection {
     void signal() const noexcept;
     void enqueue(command c);
     [[nodiscard]] bool wants_more();
+    [[nodiscard]] bool takes_more() const;
 
     const server_options options_;
     const std::uintptr_t number_; // in the registry of those that the library may call
@@ -143,6 +146,7 @@ class nats_connection {
     // Of the thread.
     __natsConnection* connection_ = nullptr;
     std::uint64_t connection_number_ = 0;
+    tls_watch tls_;
     std::map<std::string, __natsSubscription*, std::less<>> subscriptions_;
     std::vector<__natsSubscription*> polled_;
 

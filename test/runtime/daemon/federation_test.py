@@ -206,22 +206,6 @@ class Federation(BridgesTest):
         self.assertLess(sum("cannot connect to NATS" in e["message"] for e in hub.entries()), 3)
         self.assertEqual(pool_of(gate)["connections"], 2)
 
-    def test_credentials(self):
-        server = self.server('authorization { token: "secret" }')
-        token = self.folder.write("secret\n", "token")
-        hub = self.node("hub", "south", server, federation=f", token: {token}")
-        wrong = self.folder.write("guess\n", "wrong")
-        gate = self.node("gate", "north", server, federation=f", token: {wrong}")
-        missing = self.node("missing", "west", server, federation=", token: /nowhere/token")
-        entry = gate.wait_for_entry("cannot connect to NATS")
-        self.assertRegex(entry["message"], "(?i)auth")
-        self.assertEqual(entry["level"], "warning")
-        missing.wait_for_entry("cannot read a token from /nowhere/token")
-        hub.wait_for_entry("connected to NATS, as a bridge of the pool 'south'")
-        self.assertIn("seconds", json.loads(gate.ask("PULL gate:utc")))
-        self.folder.write("secret\n", "wrong")  # read at the next attempt
-        wait_until(lambda: "seconds" in json.loads(hub.ask("PULL north.gate:utc")), "it works")
-
     def test_a_server_that_is_full(self):
         server = self.server("max_connections: 1")
         hub = self.node("hub", "south", server)

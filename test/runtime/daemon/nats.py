@@ -35,6 +35,10 @@ class NatsServer(Folder):
     def url(self):
         return f"nats://127.0.0.1:{self.port}"
 
+    @property
+    def tls_url(self):
+        return f"tls://127.0.0.1:{self.port}"
+
     def stop(self):
         if self.process.poll() is None:
             self.process.kill()
