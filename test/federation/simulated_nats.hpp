@@ -23,7 +23,8 @@ class site;
 class simulated_nats {
   public:
     struct faults {
-        std::chrono::microseconds longest_delay{0}; ///< of a message; more than one may overtake each other
+        std::chrono::microseconds shortest_delay{0}; ///< of a message
+        std::chrono::microseconds longest_delay{0};  ///< of a message; more than one may overtake each other
         double loss = 0;
         double repetition = 0;
     };
@@ -91,6 +92,8 @@ class site final : public bridge_output {
     /// The last line that answers the request.
     [[nodiscard]] std::string answer(std::uint64_t id) const;
 
+    /// The node, if it is another one: receives the lines, and passes its own to `core`.
+    std::function<void(const bridge_link& on, const std::string& line)> serves;
     std::vector<std::string> names; ///< of its pool's nodes
     std::chrono::milliseconds answer_after{0};
     std::map<std::string, int> executed;                       ///< how often, by the body of the request
