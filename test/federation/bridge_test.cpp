@@ -520,13 +520,38 @@ BOOST_FIXTURE_TEST_CASE(when_the_publishing_bridge_is_lost_the_node_binds_again,
     auto& other = gate.bound.empty() ? gate : second;
     publisher.restart();
     nats.run_for(2s);
-    BOOST_TEST(count(hub.lost, "bindings north") == 1U);
+    BOOST_TEST(count(hub.lost, "binding car9:speed") == 1U);
     hub.ask("north", "BIND car9:speed");
     nats.run_for(10ms);
     BOOST_TEST(other.bound.contains("car9:speed"));
     other.update("car9:speed", 9);
     nats.run_for(10ms);
     BOOST_TEST(hub.updates.back() == "UPDATE car9:speed seq=9 epoch=5f3a09c1 {\"n\":9}");
+}
+
+BOOST_FIXTURE_TEST_CASE(what_other_bridges_hold_stays_bound_when_one_is_lost, two_pools) {
+    site second{nats, "north", "second"};
+    second.connect();
+    nats.run_for(2s);
+    for (int i = 0; i < 10; ++i) {
+        hub.ask("north", "BIND car9:n" + std::to_string(i));
+    }
+    nats.run_for(10ms);
+    const auto held = gate.bound;
+    BOOST_REQUIRE(!held.empty());
+    BOOST_REQUIRE(!second.bound.empty());
+    gate.restart();
+    nats.run_for(2s);
+    BOOST_TEST(hub.lost.size() == held.size());
+    BOOST_TEST(second.bound.size() == 10U - held.size());
+    for (int i = 0; i < 10; ++i) {
+        const auto noun = "car9:n" + std::to_string(i);
+        BOOST_TEST(count(hub.lost, "binding " + noun) == held.count(noun));
+        second.update(noun, 5);
+        nats.run_for(10ms);
+        BOOST_TEST(has_words(hub.updates, "UPDATE " + noun + " ") != held.contains(noun), noun);
+        BOOST_TEST(hub.subscribes("cles.north.feed.car9.n" + std::to_string(i), false) != held.contains(noun));
+    }
 }
 
 BOOST_FIXTURE_TEST_CASE(the_bindings_of_a_lost_bridge_end, two_pools) {
@@ -548,7 +573,7 @@ BOOST_FIXTURE_TEST_CASE(who_was_taken_for_lost_is_told, two_pools) {
     BOOST_TEST(hub.lost.empty());
     nats.lose = nullptr;
     nats.run_for(1s);
-    BOOST_TEST(count(hub.lost, "pool north") + count(hub.lost, "bindings north") == 1U);
+    BOOST_TEST(count(hub.lost, "pool north") + count(hub.lost, "binding car9:speed") == 1U);
     BOOST_TEST(hub.core().is_live("north"));
 }
 

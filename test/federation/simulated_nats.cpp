@@ -287,7 +287,9 @@ void site::lose_all(std::string_view) {
     delivered_.clear();
 }
 
-void site::lose_bindings(std::string_view pool, std::string_view) { lost.push_back("bindings " + std::string{pool}); }
+void site::lose_binding(const bridge_link&, const std::string& noun, std::string_view) {
+    lost.push_back("binding " + noun);
+}
 
 void site::log(log_level, const std::string& text) { logged.push_back(text); }
 

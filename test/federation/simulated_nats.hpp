@@ -101,7 +101,7 @@ class site final : public bridge_output {
     std::map<std::uint64_t, std::vector<std::string>> answers; ///< to its own requests
     std::vector<std::string> updates;                          ///< lines
     std::set<std::string> bound;                               ///< nouns that the bridge has bound at the node
-    std::vector<std::string> lost; ///< what was lost: "to_pool north", "bindings north", "all"
+    std::vector<std::string> lost; ///< what was lost: "pool north", "binding car9:speed", "all"
     std::vector<std::string> logged;
     int pools_changed = 0;
     bool is_full = false; ///< only short messages can be published
@@ -113,7 +113,7 @@ class site final : public bridge_output {
     void deliver(const bridge_link& on, std::string line) override;
     void lose_pool(std::string_view pool, std::string_view why) override;
     void lose_all(std::string_view why) override;
-    void lose_bindings(std::string_view pool, std::string_view why) override;
+    void lose_binding(const bridge_link& on, const std::string& noun, std::string_view why) override;
     void on_pools_changed() override { ++pools_changed; }
     [[nodiscard]] std::vector<std::string> home_names() const override { return names; }
     void log(log_level level, const std::string& text) override;

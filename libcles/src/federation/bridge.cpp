@@ -356,9 +356,10 @@ void bridge::on_lost(const bridge_id& gone, std::string_view why) {
         out_.lose_pool(gone.pool, why);
     } else {
         sent_.on_lost(gone, why);
-        if (feeds_.depends_on(gone)) {
-            end_bindings(feeds_.remove_bound(gone.pool)); // the node binds these again
-            out_.lose_bindings(gone.pool, why);
+        const auto lost = feeds_.remove_held(gone);
+        end_bindings(lost);
+        for (const auto& each : lost) { // the node binds these again
+            out_.lose_binding(each.noun.on(), each.noun.text(), why);
         }
     }
     out_.on_pools_changed();

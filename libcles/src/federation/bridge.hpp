@@ -49,8 +49,8 @@ class bridge_output {
     /// The links to and from that pool are lost.
     virtual void lose_pool(std::string_view pool, std::string_view why) = 0;
     virtual void lose_all(std::string_view why) = 0;
-    /// The bindings on the links to the pool are lost.
-    virtual void lose_bindings(std::string_view pool, std::string_view why) = 0;
+    /// The binding of that noun on the link is lost.
+    virtual void lose_binding(const bridge_link& on, const std::string& noun, std::string_view why) = 0;
     /// There are other pools, or other nodes in them.
     virtual void on_pools_changed() = 0;
 

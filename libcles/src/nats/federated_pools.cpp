@@ -461,11 +461,9 @@ void federated_pools::lose_all(std::string_view why) {
     lose_if([](const bridge_link&) { return true; }, why);
 }
 
-void federated_pools::lose_bindings(std::string_view pool, std::string_view why) {
-    for (const auto& [which, link] : links_) {
-        if (which.what == bridge_link::role::to_pool && which.pool == pool) {
-            link->lose_bindings(why);
-        }
+void federated_pools::lose_binding(const bridge_link& on, const std::string& noun, std::string_view why) {
+    if (const auto found = links_.find(on); found != links_.end()) {
+        found->second->lose_binding(noun, why);
     }
 }
 

@@ -76,7 +76,7 @@ class federated_pools final : public core::other_pools,
     void deliver(const bridging::bridge_link& on, std::string line) override;
     void lose_pool(std::string_view pool, std::string_view why) override;
     void lose_all(std::string_view why) override;
-    void lose_bindings(std::string_view pool, std::string_view why) override;
+    void lose_binding(const bridging::bridge_link& on, const std::string& noun, std::string_view why) override;
     void on_pools_changed() override;
     [[nodiscard]] std::vector<std::string> home_names() const override;
     void log(log_level level, const std::string& text) override;
