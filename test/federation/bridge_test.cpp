@@ -437,6 +437,23 @@ BOOST_FIXTURE_TEST_CASE(updates_are_published_once_whoever_is_bound, two_pools) 
     BOOST_TEST(!gate.bound.contains("car9:speed"));
 }
 
+BOOST_FIXTURE_TEST_CASE(updates_that_cannot_be_sent_are_counted, two_pools) {
+    hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    gate.update("car9:speed", 1);
+    gate.is_full = true;
+    gate.update("car9:speed", 2);
+    gate.update("car9:speed", 3);
+    gate.is_full = false;
+    gate.core().on_line({bridge_link::role::publications},
+                        "UPDATE car9:speed seq=4 epoch=5f3a09c1 [\"" + std::string(70'000, 'x') + "\"]", nats.now());
+    gate.update("car9:speed", 5);
+    nats.run_for(10ms);
+    BOOST_TEST(gate.core().counted().updates_sent == 2U);
+    BOOST_TEST(gate.core().counted().updates_dropped == 3U);
+    BOOST_TEST(hub.updates.size() == 2U);
+}
+
 BOOST_FIXTURE_TEST_CASE(a_noun_is_bound_under_several_names, two_pools) {
     hub.ask("north", "BIND car9:speed");
     hub.ask("north", "BIND north.car9:speed");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // A service that binds nouns of another pool, through a NATS server and bridges of which the test plays the part.
 
+#include <cles/convert.hpp>
 #include <cles/federation.hpp>
 #include <cles/service.hpp>
 
@@ -17,6 +18,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -185,6 +187,29 @@ BOOST_AUTO_TEST_CASE(a_lost_bridge_takes_only_its_own_bindings_with_it) {
     until([&] { return pose.bodies().size() == 1 && speed.bodies().size() == 1; });
     BOOST_TEST(speed.count(feed_event::lost) == 0U);
     BOOST_TEST(nats.published("cles.north.bind.car1.speed").size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(what_a_full_link_does_not_take_is_counted) {
+    bind(pose, "pose", 1, one);
+    // The server reads nothing. So the link counts as slow, and the service takes nothing from it until it has sent.
+    int sent = 0;
+    run_until(io, [&] {
+        io.poll();
+        if (metric(*hub, "unsent", "federation") < 2'000'000) {
+            hub->async_push("north.car1:log", cles::json_text{"[\"" + std::string(500'000, 'x') + "\"]"},
+                            [](boost::system::error_code, const cles::json_text&) {});
+        }
+        update("pose", ++sent, "[\"" + std::string(8'000, 'x') + "\"]");
+        return metric(*hub, "updates_dropped_to_node", "federation") != 0;
+    });
+    until([&] { return metric(*hub, "updates_received", "federation") == static_cast<std::uint64_t>(sent); });
+    const auto dropped = metric(*hub, "updates_dropped_to_node", "federation");
+    until([&] { // the server reads again
+        update("pose", ++sent, "[1]");
+        return !pose.items.empty() && pose.items.back().value.text == "[1]";
+    });
+    BOOST_TEST(pose.missed() >= dropped);
+    BOOST_TEST(metric(*hub, "updates_dropped_to_nats", "federation") == 0U);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -778,11 +778,9 @@ void bridge::send_update(std::string_view line) {
     const auto task = noun.substr(colon + 1, noun.find('/') == std::string_view::npos ? std::string_view::npos
                                                                                       : noun.find('/') - colon - 1);
     auto message = std::string{text.substr(colon + 1 + task.size())};
-    if (message.size() > max_message_) { // shows as a gap
-        return;
-    }
-    ++figures_.updates_sent;
-    publish(feed_subject(setup_.pool, noun.substr(0, colon), task), std::move(message));
+    const bool is_sent = message.size() <= max_message_ &&
+                         publish(feed_subject(setup_.pool, noun.substr(0, colon), task), std::move(message));
+    ++(is_sent ? figures_.updates_sent : figures_.updates_dropped); // shows as a gap
 }
 
 void bridge::end_published(const std::string& noun) {

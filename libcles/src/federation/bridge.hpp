@@ -80,6 +80,7 @@ class bridge final : private sent_requests_events {
         std::uint64_t requests_taken = 0;
         std::uint64_t updates_sent = 0;
         std::uint64_t updates_received = 0;
+        std::uint64_t updates_dropped = 0;  ///< not sent: too long, or too much waits already
         std::uint64_t messages_refused = 0; ///< not of this protocol, or repeated
         std::uint64_t bridges_lost = 0;
         std::uint64_t connections = 0;
