@@ -437,6 +437,23 @@ BOOST_FIXTURE_TEST_CASE(updates_are_published_once_whoever_is_bound, two_pools) 
     BOOST_TEST(!gate.bound.contains("car9:speed"));
 }
 
+BOOST_FIXTURE_TEST_CASE(updates_that_cannot_be_sent_are_counted, two_pools) {
+    hub.ask("north", "BIND car9:speed");
+    nats.run_for(10ms);
+    gate.update("car9:speed", 1);
+    gate.is_full = true;
+    gate.update("car9:speed", 2);
+    gate.update("car9:speed", 3);
+    gate.is_full = false;
+    gate.core().on_line({bridge_link::role::publications},
+                        "UPDATE car9:speed seq=4 epoch=5f3a09c1 [\"" + std::string(70'000, 'x') + "\"]", nats.now());
+    gate.update("car9:speed", 5);
+    nats.run_for(10ms);
+    BOOST_TEST(gate.core().counted().updates_sent == 2U);
+    BOOST_TEST(gate.core().counted().updates_dropped == 3U);
+    BOOST_TEST(hub.updates.size() == 2U);
+}
+
 BOOST_FIXTURE_TEST_CASE(a_noun_is_bound_under_several_names, two_pools) {
     hub.ask("north", "BIND car9:speed");
     hub.ask("north", "BIND north.car9:speed");
@@ -520,13 +537,38 @@ BOOST_FIXTURE_TEST_CASE(when_the_publishing_bridge_is_lost_the_node_binds_again,
     auto& other = gate.bound.empty() ? gate : second;
     publisher.restart();
     nats.run_for(2s);
-    BOOST_TEST(count(hub.lost, "bindings north") == 1U);
+    BOOST_TEST(count(hub.lost, "binding car9:speed") == 1U);
     hub.ask("north", "BIND car9:speed");
     nats.run_for(10ms);
     BOOST_TEST(other.bound.contains("car9:speed"));
     other.update("car9:speed", 9);
     nats.run_for(10ms);
     BOOST_TEST(hub.updates.back() == "UPDATE car9:speed seq=9 epoch=5f3a09c1 {\"n\":9}");
+}
+
+BOOST_FIXTURE_TEST_CASE(what_other_bridges_hold_stays_bound_when_one_is_lost, two_pools) {
+    site second{nats, "north", "second"};
+    second.connect();
+    nats.run_for(2s);
+    for (int i = 0; i < 10; ++i) {
+        hub.ask("north", "BIND car9:n" + std::to_string(i));
+    }
+    nats.run_for(10ms);
+    const auto held = gate.bound;
+    BOOST_REQUIRE(!held.empty());
+    BOOST_REQUIRE(!second.bound.empty());
+    gate.restart();
+    nats.run_for(2s);
+    BOOST_TEST(hub.lost.size() == held.size());
+    BOOST_TEST(second.bound.size() == 10U - held.size());
+    for (int i = 0; i < 10; ++i) {
+        const auto noun = "car9:n" + std::to_string(i);
+        BOOST_TEST(count(hub.lost, "binding " + noun) == held.count(noun));
+        second.update(noun, 5);
+        nats.run_for(10ms);
+        BOOST_TEST(has_words(hub.updates, "UPDATE " + noun + " ") != held.contains(noun), noun);
+        BOOST_TEST(hub.subscribes("cles.north.feed.car9.n" + std::to_string(i), false) != held.contains(noun));
+    }
 }
 
 BOOST_FIXTURE_TEST_CASE(the_bindings_of_a_lost_bridge_end, two_pools) {
@@ -548,7 +590,7 @@ BOOST_FIXTURE_TEST_CASE(who_was_taken_for_lost_is_told, two_pools) {
     BOOST_TEST(hub.lost.empty());
     nats.lose = nullptr;
     nats.run_for(1s);
-    BOOST_TEST(count(hub.lost, "pool north") + count(hub.lost, "bindings north") == 1U);
+    BOOST_TEST(count(hub.lost, "pool north") + count(hub.lost, "binding car9:speed") == 1U);
     BOOST_TEST(hub.core().is_live("north"));
 }
 

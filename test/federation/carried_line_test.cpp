@@ -29,6 +29,12 @@ BOOST_AUTO_TEST_CASE(the_message_is_the_rest_of_the_line) {
     BOOST_TEST(message_of(parsed("PUSH car1:speed x=1 id=7  {\"a\": 1}"), "south") == " x=1 {\"a\": 1}");
 }
 
+BOOST_AUTO_TEST_CASE(another_deadline_takes_the_place_of_the_requests_own) {
+    BOOST_TEST(message_of(parsed("PUSH all:speed/fast id=7 x=1 deadline=900 via=hub {}"), "south", 675) ==
+               "/fast deadline=675 x=1 via=south.hub {}");
+    BOOST_TEST(message_within_pool(parsed("PULL all:speed id=7 via=hub"), 4000) == " deadline=4000");
+}
+
 BOOST_AUTO_TEST_CASE(what_a_bridge_passes_on_keeps_via) {
     BOOST_TEST(message_of(parsed("PULL car1:speed via=hub"), {}) == " via=hub");
 }

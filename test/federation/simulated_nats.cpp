@@ -67,7 +67,8 @@ void simulated_nats::send(site& to, std::uint64_t connection, const std::string&
     }
     const int copies = happens(faults_.repetition) ? 2 : 1;
     for (int i = 0; i < copies; ++i) {
-        const auto delay = std::uniform_int_distribution<std::int64_t>{0, faults_.longest_delay.count()}(random_);
+        const auto delay = std::uniform_int_distribution<std::int64_t>{faults_.shortest_delay.count(),
+                                                                       faults_.longest_delay.count()}(random_);
         at(now_ + std::chrono::microseconds{delay}, [this, &to, connection, subject, reply, message] {
             if (sites_.contains(&to) && to.connection() == connection) {
                 to.receive(subject, reply, message);
@@ -227,6 +228,10 @@ void site::reply(const bridge_link& on, std::uint64_t id, const std::string& res
 }
 
 void site::serve(const bridge_link& on, const std::string& line) {
+    if (serves) {
+        serves(on, line);
+        return;
+    }
     protocol::request_line r;
     protocol::malformed_request wrong;
     if (!protocol::parse_request(line, r, wrong)) {
@@ -282,7 +287,9 @@ void site::lose_all(std::string_view) {
     delivered_.clear();
 }
 
-void site::lose_bindings(std::string_view pool, std::string_view) { lost.push_back("bindings " + std::string{pool}); }
+void site::lose_binding(const bridge_link&, const std::string& noun, std::string_view) {
+    lost.push_back("binding " + noun);
+}
 
 void site::log(log_level, const std::string& text) { logged.push_back(text); }
 

@@ -23,7 +23,8 @@ class site;
 class simulated_nats {
   public:
     struct faults {
-        std::chrono::microseconds longest_delay{0}; ///< of a message; more than one may overtake each other
+        std::chrono::microseconds shortest_delay{0}; ///< of a message
+        std::chrono::microseconds longest_delay{0};  ///< of a message; more than one may overtake each other
         double loss = 0;
         double repetition = 0;
     };
@@ -91,6 +92,8 @@ class site final : public bridge_output {
     /// The last line that answers the request.
     [[nodiscard]] std::string answer(std::uint64_t id) const;
 
+    /// The node, if it is another one: receives the lines, and passes its own to `core`.
+    std::function<void(const bridge_link& on, const std::string& line)> serves;
     std::vector<std::string> names; ///< of its pool's nodes
     std::chrono::milliseconds answer_after{0};
     std::map<std::string, int> executed;                       ///< how often, by the body of the request
@@ -98,7 +101,7 @@ class site final : public bridge_output {
     std::map<std::uint64_t, std::vector<std::string>> answers; ///< to its own requests
     std::vector<std::string> updates;                          ///< lines
     std::set<std::string> bound;                               ///< nouns that the bridge has bound at the node
-    std::vector<std::string> lost; ///< what was lost: "to_pool north", "bindings north", "all"
+    std::vector<std::string> lost; ///< what was lost: "pool north", "binding car9:speed", "all"
     std::vector<std::string> logged;
     int pools_changed = 0;
     bool is_full = false; ///< only short messages can be published
@@ -110,7 +113,7 @@ class site final : public bridge_output {
     void deliver(const bridge_link& on, std::string line) override;
     void lose_pool(std::string_view pool, std::string_view why) override;
     void lose_all(std::string_view why) override;
-    void lose_bindings(std::string_view pool, std::string_view why) override;
+    void lose_binding(const bridge_link& on, const std::string& noun, std::string_view why) override;
     void on_pools_changed() override { ++pools_changed; }
     [[nodiscard]] std::vector<std::string> home_names() const override { return names; }
     void log(log_level level, const std::string& text) override;

@@ -39,8 +39,8 @@ class link_events {
     /// Over datagrams: the peer has restarted, and has another epoch. It may have received what was sent before, or
     /// not.
     virtual void on_restart() {}
-    /// The bindings made on the link have ended; requests go on.
-    virtual void on_bindings_lost(const std::string& /*why*/) {}
+    /// The binding of this noun, as it was made on the link, has ended; all else goes on.
+    virtual void on_binding_lost(std::string_view /*noun*/, const std::string& /*why*/) {}
     /// Over datagrams: the peer does not prove its name. \param lost what is sent to it is lost meanwhile
     virtual void on_unanswered(bool /*lost*/) {}
     /// The former name of `on_writable`, for callers.

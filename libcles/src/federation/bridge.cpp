@@ -162,7 +162,7 @@ void bridge::on_message(std::string_view where, std::string_view reply, std::str
                            {.code = errc::too_large,
                             .message = "a request has at most " + std::to_string(max_message_) + " bytes here"});
         } else if (about.kind == subject_kind::reply) {
-            sent_.on_unusable(about.number, message,
+            sent_.on_unusable(about.number, message, now,
                               {.code = errc::too_large,
                                .message = "the reply has " + std::to_string(message.size()) + " bytes; at most " +
                                           std::to_string(max_message_) + " are read here",
@@ -176,7 +176,7 @@ void bridge::on_message(std::string_view where, std::string_view reply, std::str
         if (about.kind == subject_kind::request) {
             refuse_foreign(std::string{reply}, {.code = errc::bad_request, .message = std::string{why}});
         } else if (about.kind == subject_kind::reply) {
-            sent_.on_unusable(about.number, message,
+            sent_.on_unusable(about.number, message, now,
                               {.code = errc::failed, .message = "the reply that came through NATS is not one line"});
         }
         return;
@@ -190,7 +190,7 @@ void bridge::on_message(std::string_view where, std::string_view reply, std::str
     case subject_kind::heartbeat: on_heartbeat(about, message, now); break;
     case subject_kind::names: on_names(about, message); break;
     case subject_kind::control: on_control(reply, message, now); break;
-    case subject_kind::reply: sent_.on_message(about.number, message); break;
+    case subject_kind::reply: sent_.on_message(about.number, message, now); break;
     case subject_kind::foreign: drop(where, "it is not a subject of CLES"); break;
     }
 }
@@ -356,9 +356,10 @@ void bridge::on_lost(const bridge_id& gone, std::string_view why) {
         out_.lose_pool(gone.pool, why);
     } else {
         sent_.on_lost(gone, why);
-        if (feeds_.depends_on(gone)) {
-            end_bindings(feeds_.remove_bound(gone.pool)); // the node binds these again
-            out_.lose_bindings(gone.pool, why);
+        const auto lost = feeds_.remove_held(gone);
+        end_bindings(lost);
+        for (const auto& each : lost) { // the node binds these again
+            out_.lose_binding(each.noun.on(), each.noun.text(), why);
         }
     }
     out_.on_pools_changed();
@@ -492,20 +493,22 @@ void bridge::send_request(const bridge_link& from, std::string_view line, time_p
 void bridge::publish_request(const bridge_link& from, const protocol::request_line& r, time_point now) {
     const auto& pool = from.pool;
     const auto number = sent_.add(from, r.id, now + milliseconds{r.deadline_ms}, now);
-    const auto fail = [&](const protocol::failure& why) { sent_.on_message(number, protocol::failure_text(why)); };
+    const auto fail = [&](const protocol::failure& why) { sent_.refuse(number, why); };
     if (has_crossed(r.via)) { // a node of that name in another pool is not the one that was meant
         fail({.code = errc::no_target, .message = "a request from another pool is not sent on to '" + pool + "'"});
         return;
     }
-    auto message = pool == setup_.pool ? message_within_pool(r) : message_of(r, setup_.pool);
+    const auto node = without_pool(r.noun.target, pool);
+    const auto deadline = node == "all" ? sent_.deadline_of_all(pool, r.deadline_ms) : 0;
+    auto message = pool == setup_.pool ? message_within_pool(r, deadline) : message_of(r, setup_.pool, deadline);
     if (message.size() > max_message_) {
         fail({.code = errc::too_large,
               .message = "a request through NATS has at most " + std::to_string(max_message_) + " bytes here"});
         return;
     }
     ++figures_.requests_sent;
-    if (!out_.publish(request_subject(pool, r.verb, without_pool(r.noun.target, pool), r.noun.task),
-                      reply_subject(self_, number), std::move(message), bridge_output::room::shared)) {
+    if (!out_.publish(request_subject(pool, r.verb, node, r.noun.task), reply_subject(self_, number),
+                      std::move(message), bridge_output::room::shared)) {
         fail({.code = errc::busy,
               .message = "too much waits to be sent to NATS",
               .retry_ms = protocol::default_retry_ms});
@@ -775,11 +778,9 @@ void bridge::send_update(std::string_view line) {
     const auto task = noun.substr(colon + 1, noun.find('/') == std::string_view::npos ? std::string_view::npos
                                                                                       : noun.find('/') - colon - 1);
     auto message = std::string{text.substr(colon + 1 + task.size())};
-    if (message.size() > max_message_) { // shows as a gap
-        return;
-    }
-    ++figures_.updates_sent;
-    publish(feed_subject(setup_.pool, noun.substr(0, colon), task), std::move(message));
+    const bool is_sent = message.size() <= max_message_ &&
+                         publish(feed_subject(setup_.pool, noun.substr(0, colon), task), std::move(message));
+    ++(is_sent ? figures_.updates_sent : figures_.updates_dropped); // shows as a gap
 }
 
 void bridge::end_published(const std::string& noun) {

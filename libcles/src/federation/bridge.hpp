@@ -49,8 +49,8 @@ class bridge_output {
     /// The links to and from that pool are lost.
     virtual void lose_pool(std::string_view pool, std::string_view why) = 0;
     virtual void lose_all(std::string_view why) = 0;
-    /// The bindings on the links to the pool are lost.
-    virtual void lose_bindings(std::string_view pool, std::string_view why) = 0;
+    /// The binding of that noun on the link is lost.
+    virtual void lose_binding(const bridge_link& on, const std::string& noun, std::string_view why) = 0;
     /// There are other pools, or other nodes in them.
     virtual void on_pools_changed() = 0;
 
@@ -80,6 +80,7 @@ class bridge final : private sent_requests_events {
         std::uint64_t requests_taken = 0;
         std::uint64_t updates_sent = 0;
         std::uint64_t updates_received = 0;
+        std::uint64_t updates_dropped = 0;  ///< not sent: too long, or too much waits already
         std::uint64_t messages_refused = 0; ///< not of this protocol, or repeated
         std::uint64_t bridges_lost = 0;
         std::uint64_t connections = 0;

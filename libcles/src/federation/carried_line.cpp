@@ -13,13 +13,18 @@ namespace {
 constexpr std::string_view crossed = ".nats";
 
 // Appends the adverbs, without `id`, and the body. \param home of the names in `via`; nothing: `via` is left out
-void append_rest(std::string& out, const protocol::request_line& r, std::optional<std::string_view> home) {
+// \param deadline_ms instead of the request's; 0: that one
+void append_rest(std::string& out, const protocol::request_line& r, std::optional<std::string_view> home,
+                 std::uint32_t deadline_ms = 0) {
+    if (deadline_ms != 0) {
+        out.append(" deadline=").append(std::to_string(deadline_ms));
+    }
     protocol::part_reader parts{r.text};
     parts.next(); // verb
     parts.next(); // noun
     for (auto part = parts.next(); !part.empty(); part = parts.next()) {
         const bool is_via = part.starts_with("via=");
-        if (part.starts_with("id=") || (is_via && !home)) {
+        if (part.starts_with("id=") || (is_via && !home) || (deadline_ms != 0 && part.starts_with("deadline="))) {
             continue;
         }
         out.push_back(' ');
@@ -46,15 +51,15 @@ void append_rest(std::string& out, const protocol::request_line& r, std::optiona
 
 } // namespace
 
-std::string message_of(const protocol::request_line& request, std::string_view home) {
+std::string message_of(const protocol::request_line& request, std::string_view home, std::uint32_t deadline_ms) {
     std::string made{request.noun.path.substr(request.noun.task.size())};
-    append_rest(made, request, home);
+    append_rest(made, request, home, deadline_ms);
     return made;
 }
 
-std::string message_within_pool(const protocol::request_line& request) {
+std::string message_within_pool(const protocol::request_line& request, std::uint32_t deadline_ms) {
     std::string made{request.noun.path.substr(request.noun.task.size())};
-    append_rest(made, request, {});
+    append_rest(made, request, {}, deadline_ms);
     return made;
 }
 

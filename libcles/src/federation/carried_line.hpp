@@ -16,10 +16,11 @@ namespace cles::bridging {
 
 /// The message for a request, after its task: " deadline=900 via=south.hub {...}", or "/fast deadline=900 ...".
 /// \param home the pool that the nodes in `via` belong to; empty: they remain as they are
-std::string message_of(const protocol::request_line& request, std::string_view home);
+/// \param deadline_ms instead of the request's; 0: that one
+std::string message_of(const protocol::request_line& request, std::string_view home, std::uint32_t deadline_ms = 0);
 /// The same within the own pool: without `via`, because the request may lead to nodes that have forwarded it to the
 /// bridge, or to the bridge itself.
-std::string message_within_pool(const protocol::request_line& request);
+std::string message_within_pool(const protocol::request_line& request, std::uint32_t deadline_ms = 0);
 
 /// The line of a request that has arrived, without LF, with that id, and with `via_of`.
 std::string line_of(const protocol::request_line& request, std::uint64_t id, std::string_view from);

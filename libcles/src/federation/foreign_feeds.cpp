@@ -3,7 +3,6 @@
 
 #include "federation/carried_line.hpp"
 
-#include <algorithm>
 #include <tuple>
 #include <utility>
 
@@ -11,8 +10,6 @@ namespace cles::bridging {
 namespace {
 
 auto subject_key(const foreign_noun& n) { return std::tie(n.pool, n.node, n.task); }
-
-bridge_link link_of(const foreign_noun& n) { return {bridge_link::role::to_pool, n.pool, n.link}; }
 
 foreign_noun first_of(std::string pool, std::string node, std::string task) {
     return {.pool = std::move(pool), .node = std::move(node), .task = std::move(task), .parameters = {}, .target = {}};
@@ -45,7 +42,7 @@ std::vector<foreign_feeds::update> foreign_feeds::on_bound(std::uint64_t id, std
     b.taker = taker;
     std::vector<update> waiting;
     for (auto& line : std::exchange(b.held, {})) {
-        waiting.push_back({link_of(noun), std::move(line)});
+        waiting.push_back({noun.on(), std::move(line)});
     }
     return waiting;
 }
@@ -87,15 +84,17 @@ std::vector<foreign_feeds::removed> foreign_feeds::remove_if(Condition concerns)
 }
 
 std::vector<foreign_feeds::removed> foreign_feeds::remove_link(const bridge_link& link) {
-    return remove_if([&link](const foreign_noun& n, const binding&) { return link_of(n) == link; });
+    return remove_if([&link](const foreign_noun& n, const binding&) { return n.on() == link; });
 }
 
 std::vector<foreign_feeds::removed> foreign_feeds::remove_pool(std::string_view pool) {
     return remove_if([pool](const foreign_noun& n, const binding&) { return n.pool == pool; });
 }
 
-std::vector<foreign_feeds::removed> foreign_feeds::remove_bound(std::string_view pool) {
-    return remove_if([pool](const foreign_noun& n, const binding& b) { return n.pool == pool && b.id == 0; });
+std::vector<foreign_feeds::removed> foreign_feeds::remove_held(const bridge_id& taker) {
+    return remove_if([&taker](const foreign_noun& n, const binding& b) {
+        return n.pool == taker.pool && b.taker == taker.instance && b.id == 0;
+    });
 }
 
 void foreign_feeds::clear() {
@@ -115,7 +114,7 @@ std::vector<foreign_feeds::update> foreign_feeds::on_update(const subject& about
         }
         auto line = text_of(verb::update, noun.target, noun.task, message);
         if (b.id == 0) {
-            lines.push_back({link_of(noun), std::move(line)});
+            lines.push_back({noun.on(), std::move(line)});
             continue;
         }
         auto& held = at->second.held;
@@ -125,12 +124,6 @@ std::vector<foreign_feeds::update> foreign_feeds::on_update(const subject& about
         }
     }
     return lines;
-}
-
-bool foreign_feeds::depends_on(const bridge_id& taker) const {
-    return std::ranges::any_of(bound_, [&taker](const auto& entry) {
-        return entry.first.pool == taker.pool && entry.second.taker == taker.instance;
-    });
 }
 
 } // namespace cles::bridging

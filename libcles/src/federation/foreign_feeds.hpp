@@ -26,6 +26,10 @@ struct foreign_noun {
 
     auto operator<=>(const foreign_noun&) const = default; // NOLINT(modernize-use-nullptr): not about pointers
     [[nodiscard]] std::string subject() const { return feed_subject(pool, node, task); }
+    /// As the binding names it: "north.car1:localization/fast".
+    [[nodiscard]] std::string text() const { return target + ":" + task + parameters; }
+    /// On which it is bound.
+    [[nodiscard]] bridge_link on() const { return {bridge_link::role::to_pool, pool, link}; }
 };
 
 /// The nouns of other pools that this node has bound. Updates that arrive before the reply to BIND wait for it.
@@ -53,15 +57,13 @@ class foreign_feeds {
     std::vector<removed> remove_link(const bridge_link& link);
     /// All of that pool.
     std::vector<removed> remove_pool(std::string_view pool);
-    /// The same of those whose BIND has been answered.
-    std::vector<removed> remove_bound(std::string_view pool);
+    /// All that this bridge holds.
+    std::vector<removed> remove_held(const bridge_id& taker);
     void clear();
 
     /// An update has arrived. Returns the lines for the node.
     std::vector<update> on_update(const subject& about, std::string_view message);
     [[nodiscard]] bool has(const foreign_noun& noun) const { return bound_.contains(noun); }
-    /// Whether that bridge holds one of the bindings.
-    [[nodiscard]] bool depends_on(const bridge_id& taker) const;
     [[nodiscard]] std::size_t size() const noexcept { return bound_.size(); }
 
   private:

@@ -29,10 +29,7 @@ std::string_view take_taker(std::string_view& message) noexcept {
 
 std::uint64_t sent_requests::add(const bridge_link& from, std::uint64_t id, time_point due, time_point now) {
     const auto number = ++last_;
-    sent_.emplace(number, request{.from = from,
-                                  .id = id,
-                                  .acknowledged_by = now + acknowledged_within,
-                                  .forgotten_at = due + after_deadline});
+    sent_.emplace(number, request{.from = from, .id = id, .sent_at = now, .forgotten_at = due + after_deadline});
     numbers_.insert_or_assign(id, number);
     return number;
 }
@@ -45,14 +42,16 @@ sent_requests::requests::iterator sent_requests::erase(requests::iterator which)
     return sent_.erase(which);
 }
 
-void sent_requests::on_message(std::uint64_t number, std::string_view message) {
+void sent_requests::refuse(std::uint64_t number, const protocol::failure& why) { fail(sent_.find(number), why); }
+
+void sent_requests::on_message(std::uint64_t number, std::string_view message, time_point now) {
     const auto taker = take_taker(message);
     const auto found = sent_.find(number);
     if (found == sent_.end()) {
         return;
     }
     if (!taker.empty()) {
-        on_taken(found, taker);
+        on_taken(found, taker, now);
     }
     const auto again = sent_.find(number);
     if (message.empty() || again == sent_.end()) {
@@ -72,9 +71,10 @@ void sent_requests::on_message(std::uint64_t number, std::string_view message) {
     }
 }
 
-void sent_requests::on_unusable(std::uint64_t number, std::string_view message, const protocol::failure& why) {
+void sent_requests::on_unusable(std::uint64_t number, std::string_view message, time_point now,
+                                const protocol::failure& why) {
     if (const auto taker = take_taker(message); !taker.empty()) {
-        on_message(number, taken_text(taker));
+        on_message(number, taken_text(taker), now);
     }
     if (const auto found = sent_.find(number); found != sent_.end()) {
         if (const auto& r = found->second; !r.taker.empty()) { // it may continue there, or be bound
@@ -84,14 +84,32 @@ void sent_requests::on_unusable(std::uint64_t number, std::string_view message, 
     }
 }
 
-void sent_requests::on_taken(requests::iterator which, std::string_view taker) {
+void sent_requests::on_taken(requests::iterator which, std::string_view taker, time_point now) {
     auto& r = which->second;
+    if (r.taker.empty()) {
+        note_round_trip(r.from.pool, std::min<time_point::duration>(now - r.sent_at, acknowledged_within));
+    }
     if (r.is_cancelled) {
         events_.cancel_at({r.from.pool, std::string{taker}}, which->first);
         erase(which);
     } else if (r.taker.empty()) {
         r.taker = taker;
     }
+}
+
+// Follows a longer one at once, and a shorter one slowly.
+void sent_requests::note_round_trip(const std::string& pool, time_point::duration took) {
+    auto& known = round_trips_[pool];
+    known = std::max(took, known - (known - took) / 8);
+}
+
+std::uint32_t sent_requests::deadline_of_all(std::string_view pool, std::uint32_t left_ms) const {
+    using std::chrono::milliseconds;
+    constexpr milliseconds least{1'000};
+    const milliseconds left{left_ms};
+    const auto known = round_trips_.find(pool);
+    const auto way = known == round_trips_.end() ? milliseconds{0} : std::chrono::ceil<milliseconds>(known->second);
+    return static_cast<std::uint32_t>((left - std::clamp(way, std::min(left / 4, least), left * 3 / 4)).count());
 }
 
 void sent_requests::cancel(std::uint64_t id) {
@@ -141,7 +159,7 @@ void sent_requests::on_time(time_point now) {
     for (const auto& [number, r] : sent_) {
         if (r.forgotten_at <= now) {
             over.push_back(number);
-        } else if (r.taker.empty() && !r.is_cancelled && r.acknowledged_by <= now) {
+        } else if (r.taker.empty() && !r.is_cancelled && r.sent_at + acknowledged_within <= now) {
             late.push_back(number);
         }
     }
@@ -189,11 +207,15 @@ void sent_requests::close(const bridge_link& link) {
 
 void sent_requests::close_pool(std::string_view pool) {
     cancel_if([pool](const request& r) { return r.from.pool == pool; });
+    if (const auto known = round_trips_.find(pool); known != round_trips_.end()) {
+        round_trips_.erase(known);
+    }
 }
 
 void sent_requests::clear() {
     sent_.clear();
     numbers_.clear();
+    round_trips_.clear();
 }
 
 } // namespace cles::bridging

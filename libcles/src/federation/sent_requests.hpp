@@ -10,7 +10,8 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -46,10 +47,12 @@ class sent_requests {
 
     /// Returns the number by which the pool answers. \param due the deadline, which both ends know
     std::uint64_t add(const bridge_link& from, std::uint64_t id, time_point due, time_point now);
+    /// It was not published.
+    void refuse(std::uint64_t number, const protocol::failure& why);
     /// A message for that number from the pool.
-    void on_message(std::uint64_t number, std::string_view message);
+    void on_message(std::uint64_t number, std::string_view message, time_point now);
     /// The pool has answered, but the message cannot be passed on: the request fails.
-    void on_unusable(std::uint64_t number, std::string_view message, const protocol::failure& why);
+    void on_unusable(std::uint64_t number, std::string_view message, time_point now, const protocol::failure& why);
     /// The node has cancelled it. A bridge that has not acknowledged it yet is told when it does.
     void cancel(std::uint64_t id);
     /// What that bridge took is not answered any more.
@@ -62,6 +65,11 @@ class sent_requests {
     /// The connection is lost. Nothing is reported.
     void clear();
 
+    /// The deadline to state to all nodes of a pool, if their results are needed within `left_ms`. The pool waits for
+    /// all until then, counted from when the request arrives. So time for the way is left: what acknowledgements of the
+    /// pool have lately taken at most, but at least a quarter or a second. A quarter remains for the nodes.
+    [[nodiscard]] std::uint32_t deadline_of_all(std::string_view pool, std::uint32_t left_ms) const;
+
     [[nodiscard]] std::size_t size() const noexcept { return sent_.size(); }
 
   private:
@@ -69,21 +77,23 @@ class sent_requests {
         bridge_link from;
         std::uint64_t id = 0;
         std::string taker{}; ///< its instance; empty: not acknowledged yet
-        time_point acknowledged_by;
+        time_point sent_at;
         time_point forgotten_at; ///< for lack of a reply
         bool is_cancelled = false;
     };
     using requests = std::unordered_map<std::uint64_t, request>;
 
-    void on_taken(requests::iterator which, std::string_view taker);
+    void on_taken(requests::iterator which, std::string_view taker, time_point now);
+    void note_round_trip(const std::string& pool, time_point::duration took);
     requests::iterator erase(requests::iterator which);
     void fail(requests::iterator which, const protocol::failure& why);
     template <class Condition>
     void cancel_if(Condition concerns);
 
     sent_requests_events& events_;
-    requests sent_;                                            // by number
-    std::unordered_map<std::uint64_t, std::uint64_t> numbers_; // by id
+    requests sent_;                                                        // by number
+    std::unordered_map<std::uint64_t, std::uint64_t> numbers_;             // by id
+    std::map<std::string, time_point::duration, std::less<>> round_trips_; // by pool
     std::uint64_t last_ = 0;
 };
 

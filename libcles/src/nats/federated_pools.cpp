@@ -420,7 +420,8 @@ bool federated_pools::refuse(const bridge_link& on, std::string_view line) {
         return false;
     }
     if (on.what == bridge_link::role::to_pool) {
-        return r.is_update(); // shows as a gap
+        updates_dropped_ += r.is_update() ? 1 : 0; // shows as a gap
+        return r.is_update();
     }
     if (on.what != bridge_link::role::from_pool || r.noun.target == "self") {
         return false;
@@ -461,11 +462,9 @@ void federated_pools::lose_all(std::string_view why) {
     lose_if([](const bridge_link&) { return true; }, why);
 }
 
-void federated_pools::lose_bindings(std::string_view pool, std::string_view why) {
-    for (const auto& [which, link] : links_) {
-        if (which.what == bridge_link::role::to_pool && which.pool == pool) {
-            link->lose_bindings(why);
-        }
+void federated_pools::lose_binding(const bridge_link& on, const std::string& noun, std::string_view why) {
+    if (const auto found = links_.find(on); found != links_.end()) {
+        found->second->lose_binding(noun, why);
     }
 }
 
@@ -568,7 +567,8 @@ void federated_pools::write_metrics(json_writer& w) const {
               std::pair{"connections", f.connections}, std::pair{"bridges_lost", f.bridges_lost},
               std::pair{"requests_sent", f.requests_sent}, std::pair{"requests_taken", f.requests_taken},
               std::pair{"updates_sent", f.updates_sent}, std::pair{"updates_received", f.updates_received},
-              std::pair{"messages_refused", f.messages_refused},
+              std::pair{"updates_dropped_to_nats", f.updates_dropped},
+              std::pair{"updates_dropped_to_node", updates_dropped_}, std::pair{"messages_refused", f.messages_refused},
               std::pair{"messages_dropped", connection_ ? connection_->dropped() : 0},
               std::pair{"unsent", std::uint64_t{unsent()}}}) {
             w.key(key);

@@ -15,6 +15,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/system/error_code.hpp>
 
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <list>
@@ -76,7 +77,7 @@ class federated_pools final : public core::other_pools,
     void deliver(const bridging::bridge_link& on, std::string line) override;
     void lose_pool(std::string_view pool, std::string_view why) override;
     void lose_all(std::string_view why) override;
-    void lose_bindings(std::string_view pool, std::string_view why) override;
+    void lose_binding(const bridging::bridge_link& on, const std::string& noun, std::string_view why) override;
     void on_pools_changed() override;
     [[nodiscard]] std::vector<std::string> home_names() const override;
     void log(log_level level, const std::string& text) override;
@@ -122,6 +123,7 @@ class federated_pools final : public core::other_pools,
     std::deque<std::shared_ptr<pool_link>> ready_; // have something for the node
     std::deque<event> events_;
     std::vector<std::pair<bridging::bridge_link, std::uint64_t>> refused_; // requests of other pools, by id
+    std::uint64_t updates_dropped_ = 0;                                    // that the node's links did not take
     std::list<waiting_dial> dials_;
     std::string last_problem_;
     bridging::logged_problems logged_; // since it was connected

@@ -161,9 +161,9 @@ void pool_link::deliver(std::string line) {
     }
 }
 
-void pool_link::lose_bindings(std::string_view why) {
+void pool_link::lose_binding(std::string noun, std::string_view why) {
     if (!closed_ && !lost_) {
-        bindings_lost_ = std::string{why};
+        bindings_lost_.emplace_back(std::move(noun), why);
         schedule();
     }
 }
@@ -203,8 +203,10 @@ void pool_link::hand_over() {
         schedule();
         return;
     }
-    if (const auto why = std::exchange(bindings_lost_, {}); why && !lost_) {
-        owner->on_bindings_lost(*why);
+    for (const auto& [noun, why] : std::exchange(bindings_lost_, {})) {
+        if (!lost_ && !closed_) {
+            owner->on_binding_lost(noun, why);
+        }
     }
     if (lost_ && !closed_) {
         closed_ = true;

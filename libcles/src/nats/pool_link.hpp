@@ -9,9 +9,10 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace cles::nats {
 
@@ -68,8 +69,8 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     void deliver(std::string line);
     /// The node takes less than arrives: lines that it can do without are not to be delivered.
     [[nodiscard]] bool is_full() const noexcept { return inbox_bytes_ > inbox_capacity; }
-    /// The bindings are lost, once the node has received what was delivered before.
-    void lose_bindings(std::string_view why);
+    /// The binding of that noun is lost, once the node has received what was delivered before.
+    void lose_binding(std::string noun, std::string_view why);
     /// The same of the link.
     void lose(std::string_view why);
     [[nodiscard]] bool is_lost() const noexcept { return lost_; }
@@ -102,7 +103,7 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     std::string output_;
     std::deque<std::string> inbox_;
     std::size_t inbox_bytes_ = 0;
-    std::optional<std::string> bindings_lost_; // why
+    std::vector<std::pair<std::string, std::string>> bindings_lost_; // nouns, and why
     bool lost_ = false;
     std::deque<given_bytes> given_; // that may not be sent yet
     std::uint64_t given_total_ = 0;

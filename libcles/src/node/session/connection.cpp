@@ -130,15 +130,20 @@ void connection::on_writable() {
 void connection::on_restart() {
     const auto keep = shared_from_this();
     marks_.reset();
-    on_bindings_lost("the publisher has restarted");
+    lose_bound({}, "the publisher has restarted");
     session_.asking().on_restart(host_->now());
 }
 
-void connection::on_bindings_lost(const std::string& why) {
+void connection::on_binding_lost(std::string_view noun, const std::string& why) {
     const auto keep = shared_from_this();
+    lose_bound(noun, why);
+}
+
+void connection::lose_bound(std::string_view noun, const std::string& why) {
     const auto at = host_->now();
     for (auto* const feed : std::vector{feeds_}) {
-        if (feed->is_bound()) { // a BIND that was not answered is sent again, or fails
+        // A BIND that was not answered is sent again, or fails.
+        if (feed->is_bound() && (noun.empty() || noun == feed->entry().terms.noun)) {
             unbind(*feed);
             feed->on_lost(why, at);
         }

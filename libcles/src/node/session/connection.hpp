@@ -65,7 +65,7 @@ class connection final : public link_events,
     [[gnu::cold]] void on_lost(boost::system::error_code why) override;
     void on_writable() override;
     [[gnu::cold]] void on_restart() override;
-    [[gnu::cold]] void on_bindings_lost(const std::string& why) override;
+    [[gnu::cold]] void on_binding_lost(std::string_view noun, const std::string& why) override;
     [[gnu::cold]] void on_unanswered(bool lost) override;
 
     // flushable
@@ -125,6 +125,8 @@ class connection final : public link_events,
     [[gnu::cold]] void close_after_flush(std::string_view why);
     [[gnu::cold]] void end(std::string_view why);
     [[gnu::cold]] void lose_feeds(std::string_view why);
+    /// Those that are bound, of this noun; empty: of all.
+    [[gnu::cold]] void lose_bound(std::string_view noun, const std::string& why);
 
     std::shared_ptr<local_node> host_;
     link_ptr link_;
