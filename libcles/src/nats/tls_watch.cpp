@@ -101,8 +101,10 @@ bool tls_watch::has_record(int socket) noexcept {
     const int awaited = is_whole ? 1 : needed;
     if (awaited != std::exchange(awaited_, awaited)) {
         static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_RCVLOWAT, &awaited, sizeof awaited));
+        return is_whole;
     }
-    return is_whole;
+    // Readable before that: the socket has no memory for more until something is read. The rest follows at once then.
+    return true;
 }
 
 std::string tls_watch::last_error() {

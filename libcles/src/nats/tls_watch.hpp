@@ -24,7 +24,8 @@ class tls_watch {
     [[nodiscard]] bool prepare(natsOptions* options, bool system_authorities);
     /// Whether the connection that was made last uses TLS.
     [[nodiscard]] bool is_used() const noexcept { return used_; }
-    /// Whether a read does not have to wait. If not, the socket is not readable until it does not.
+    /// Whether a read does not have to wait, or only for what the server sends as soon as it is read. If not, the
+    /// socket is not readable until then. \pre the socket is readable
     [[nodiscard]] bool has_record(int socket) noexcept;
     /// What OpenSSL says of the last failure; empty: nothing.
     [[nodiscard]] static std::string last_error();
