@@ -4,19 +4,10 @@
 import base64
 import binascii
 import json
-import sys
 import time
 
-try:
-    import nacl  # noqa: F401
-except ImportError:
-    # Debian installs python3-nacl for its own Python, which need not be the one that runs the tests.
-    sys.path.append("/usr/lib/python3/dist-packages")
-try:
-    from nacl.signing import SigningKey
-except ImportError as error:
-    print(f"skipped: {error} (package python3-nacl)")
-    sys.exit(77)
+import pynacl_or_skip  # noqa: F401
+from nacl.signing import SigningKey
 
 _SEED = 18 << 3
 _KINDS = {"operator": 14 << 3, "account": 0, "user": 20 << 3}
