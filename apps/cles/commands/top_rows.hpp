@@ -30,7 +30,7 @@ class node_rates {
     using time_point = std::chrono::steady_clock::time_point;
 
     /// \param run identifies a run of a node, because each run counts from 0
-    /// \param document the answer of `cles/metrics`
+    /// \param document the reply to `PULL self:cles/metrics`
     node_rate update(const std::string& run, const json_node& document, time_point now);
 
     /// Removes nodes that have not answered since.

@@ -37,8 +37,7 @@ struct federation_options {
 /// connects again whenever the connection is lost; the thread ends when the service is destroyed, which waits for
 /// it: up to 200 ms for what is left to send, and while it connects, up to one second for each server, with TLS one
 /// more for each message of the handshake, and as long as the system takes to look up its name. The files are read at
-/// each connection. The service has to route
-/// (`cles::routing`) to serve requests of other pools for other nodes.
+/// each connection. The service has to route (`cles::routing`) to serve requests of other pools for other nodes.
 /// It needs `service_options::insecure`: everybody who may publish to NATS can send requests.
 ///
 /// \throws cles::error with `invalid_option` or `invalid_name`

@@ -493,25 +493,26 @@ void bridge::send_request(const bridge_link& from, std::string_view line, time_p
 void bridge::publish_request(const bridge_link& from, const protocol::request_line& r, time_point now) {
     const auto& pool = from.pool;
     const auto number = sent_.add(from, r.id, now + milliseconds{r.deadline_ms}, now);
-    const auto fail = [&](const protocol::failure& why) { sent_.refuse(number, why); };
     if (has_crossed(r.via)) { // a node of that name in another pool is not the one that was meant
-        fail({.code = errc::no_target, .message = "a request from another pool is not sent on to '" + pool + "'"});
+        sent_.refuse(number, {.code = errc::no_target,
+                              .message = "a request from another pool is not sent on to '" + pool + "'"});
         return;
     }
     const auto node = without_pool(r.noun.target, pool);
     const auto deadline = node == "all" ? sent_.deadline_of_all(pool, r.deadline_ms) : 0;
     auto message = pool == setup_.pool ? message_within_pool(r, deadline) : message_of(r, setup_.pool, deadline);
     if (message.size() > max_message_) {
-        fail({.code = errc::too_large,
-              .message = "a request through NATS has at most " + std::to_string(max_message_) + " bytes here"});
+        sent_.refuse(number,
+                     {.code = errc::too_large,
+                      .message = "a request through NATS has at most " + std::to_string(max_message_) + " bytes here"});
         return;
     }
     ++figures_.requests_sent;
     if (!out_.publish(request_subject(pool, r.verb, node, r.noun.task), reply_subject(self_, number),
                       std::move(message), bridge_output::room::shared)) {
-        fail({.code = errc::busy,
-              .message = "too much waits to be sent to NATS",
-              .retry_ms = protocol::default_retry_ms});
+        sent_.refuse(number, {.code = errc::busy,
+                              .message = "too much waits to be sent to NATS",
+                              .retry_ms = protocol::default_retry_ms});
     }
 }
 

@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t record_head = 5;
 constexpr int longest_record = 16'384 + 256; // without its head
 
-// The library does not say which context it uses; OpenSSL tells it to this thread when it is made.
+// The library does not say which context it has made, but OpenSSL reports each new one to the thread that makes it.
 thread_local SSL_CTX** made_here = nullptr;
 
 void on_context(void* context, void*, CRYPTO_EX_DATA*, int, long, void*) {

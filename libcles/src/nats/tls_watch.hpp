@@ -10,8 +10,8 @@ namespace cles::nats {
 
 /// The TLS of a connection to NATS. libnats has no time limit for the handshake; and if a read finds less than a
 /// record, or a write more than the socket takes, it waits for the rest as long as that takes, in which time its timer
-/// may destroy what is used. So the handshake gets a limit here, a write ends with each record, and who reads asks
-/// first whether a whole record is there. Used by one thread.
+/// may destroy what is used. So the handshake gets a limit here, a write ends with each record, and `has_record`
+/// is asked before each read. Used by one thread.
 class tls_watch {
   public:
     /// `limit`: how long the handshake waits for the server each time.
