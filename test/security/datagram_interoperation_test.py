@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Datagrams that the library seals are opened by the reference implementation, and the other way round.
+"""Datagrams and messages that the library seals are opened by the reference implementation, and the other way round.
 
     datagram_interoperation_test.py PROGRAM [unittest options]       PROGRAM is cles_security_datagrams
 """
@@ -27,16 +27,19 @@ class Library(unittest.TestCase):
         self.car1 = r.Identity(seed)
         self.group_keys = os.urandom(32), os.urandom(32)
         self.salt = os.urandom(16)
-        roster = {"fleet": r.text(self.fleet.public), "version": VERSION, "last": CAR2, "generation": GENERATION,
-                  "oldest": GENERATION, "keys": self.sealed(self.fleet), "members": [
-                      {"number": number, "name": name, "key": r.text(who.public), "keys": self.sealed(who)}
-                      for number, name, who in ((CAR1, "car1", self.car1), (CAR2, "car2", self.car2))]}
         self.program = subprocess.Popen([PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.addCleanup(self.program.stdout.close)
         self.addCleanup(self.program.wait)
         self.addCleanup(self.program.stdin.close)
-        line = r.sign_roster(self.fleet, roster).decode()
+        line = self.roster(VERSION).decode()
         self.assertEqual(self.command(f"node car1 {seed.hex()} {self.fleet.public.hex()} {EPOCH} {line}"), [])
+
+    def roster(self, version: int) -> bytes:
+        return r.sign_roster(self.fleet, {
+            "fleet": r.text(self.fleet.public), "version": version, "last": CAR2, "generation": GENERATION,
+            "oldest": GENERATION, "keys": self.sealed(self.fleet), "members": [
+                {"number": number, "name": name, "key": r.text(who.public), "keys": self.sealed(who)}
+                for number, name, who in ((CAR1, "car1", self.car1), (CAR2, "car2", self.car2))]})
 
     def sealed(self, receiver: r.Identity) -> str:
         return r.text(sodium.crypto_box_seal(b"".join(self.group_keys), receiver.dh_public))
@@ -178,6 +181,74 @@ class Library(unittest.TestCase):
             self.assertEqual(datagram[8:24], self.stated_salt)
             self.assertEqual(r.open_group(key, datagram), f"UPDATE car1:speed {number}".encode())
             self.assertTrue(window.accept(int.from_bytes(datagram[24:32], "big")))
+
+    def message(self, text: bytes, counter: int, subject="cles.x", reply="", following=0) -> bytes:
+        """A message of car2."""
+        return r.seal_pool(self.group_keys[following], self.fleet.public, self.car2, CAR2, GENERATION + following, self.salt,
+                           counter, subject, reply, text)
+
+    def open_message(self, message: bytes, subject="cles.x", reply="-") -> list:
+        return self.command(f"open_message {subject} {reply} {r.instance(CAR2, self.salt)} car2.seal {message.hex()}")
+
+    def question(self, message: bytes) -> list:
+        return self.command(f"question questions {r.instance(CAR2, self.salt)} car2.seal {message.hex()}")
+
+    def opened(self, line: str, subject: str, reply: str) -> bytes:
+        """A message of the library."""
+        message = bytes.fromhex(line.split()[-1])
+        self.assertEqual(message[:8], r.head(r.POOL, CAR1) + GENERATION.to_bytes(4, "big"))
+        instance, = self.command("instance")
+        self.assertEqual(instance, f"instance {r.instance(CAR1, message[8:24])}")
+        return r.open_pool(self.group_keys[0], self.fleet.public, self.car1.public, subject, reply, message)
+
+    def test_messages_through_nats(self):
+        window = r.ReplayWindow()
+        for number in range(3):
+            sealed, = self.command(f"seal_message cles.a cles.b PULL car2:speed {number}")
+            self.assertEqual(self.opened(sealed, "cles.a", "cles.b"), f"PULL car2:speed {number}".encode())
+            self.assertTrue(window.accept(int.from_bytes(bytes.fromhex(sealed.split()[1])[24:32], "big")))
+        unproven, asked = self.open_message(self.message(b"request", 40))
+        self.assertEqual(unproven, "unproven car2 request")
+        self.assertTrue(asked.startswith("question car2.seal "))
+        word, challenge = self.opened(asked, "car2.seal", "questions").split()
+        self.assertEqual((word, len(r.binary(challenge.decode(), 16))), (b"ask", 16))
+
+        live = self.message(b"live " + challenge, 41, "questions", "car2.seal")
+        self.assertEqual(self.question(live), ["heartbeat"])
+        results = [self.open_message(self.message(b"request", counter))[0] for counter in (40, 41, 42, 42, 2000, 976, 977)]
+        self.assertEqual(results, [f"{what} car2 request" if what == "opened" else "refused  "
+                                   for what in ("refused", "refused", "opened", "refused", "opened", "refused", "opened")])
+        self.assertEqual(self.open_message(self.message(b"next", 2001, following=1)), ["opened car2 next"])
+
+        heartbeat, answer = self.question(self.message(b"ask " + challenge, 2002, "questions", "car2.seal"))
+        self.assertEqual(heartbeat, "heartbeat")
+        self.assertEqual(self.opened(answer, "car2.seal", "questions"), b"live " + challenge)
+
+    def test_no_bit_of_a_message_can_be_changed(self):
+        message = self.message(b"request", 40)
+        for place in range(len(message)):
+            changed = bytearray(message)
+            changed[place] ^= 1 << place % 8
+            self.assertEqual(self.open_message(bytes(changed))[0], "refused  ")
+        self.assertEqual(self.open_message(message, subject="cles.y"), ["refused  "])
+        self.assertEqual(self.open_message(message, reply="cles.y"), ["refused  "])
+        self.assertEqual(self.open_message(message)[0], "unproven car2 request")
+
+    def test_a_roster_is_asked_for_and_given(self):
+        given, = self.question(r.ask(CAR2, VERSION - 1))
+        self.assertTrue(given.startswith("question car2.seal "))
+        message = bytes.fromhex(given.split()[-1])
+        self.assertEqual(message[:4], r.head(r.ROSTER, CAR1))
+        self.assertEqual(r.read_roster(r.take_roster(self.car2, message), self.fleet.public)["version"], VERSION)
+        self.command("wait 1000")
+        self.assertEqual(self.question(r.ask(CAR2, VERSION)), [])
+
+        newer = self.roster(VERSION + 1)
+        answer = r.give_roster(CAR2, self.car1.public, newer)
+        self.assertEqual(self.question(answer), [])
+        asked, = self.command(f"stated {r.instance(CAR2, self.salt)} car2.seal {VERSION + 1}")
+        self.assertEqual(r.read_ask(bytes.fromhex(asked.removeprefix("question car2.seal "))), (CAR1, VERSION))
+        self.assertEqual(self.question(answer), [f"roster {newer.decode()}"])
 
 
 if __name__ == "__main__":

@@ -45,6 +45,7 @@ initiator.read(welcome[12:])
 (sending, receiving) = initiator.split()
 line = "PULL car2:localization id=5"
 reply = 'id=5 {"utc":2}'
+pool_subject, pool_reply, pool_message = "cles.a.pull.car1.speed", "cles.b.reply.1", "PULL car1:speed/front {}"
 update = 'UPDATE car2:localization seq=17 epoch=5f3a09c1 {"utc":2}'
 announced = ('{"node":"car2","endpoints":["tls://10.0.0.3:25370"],"interval_ms":1000,"tasks":"85944171f73967e8",'
              '"signed":["localization"],"roster":7}')
@@ -73,6 +74,12 @@ vectors = {
     ],
     "group": {"from": "car2", "generation": 5, "salt": salt2.hex(), "counter": 17, "line": update,
               "datagram": r.seal_group(current, 3, 5, salt2, 17, update.encode()).hex()},
+    "pool": {"from": "car2", "generation": 5, "salt": salt2.hex(), "counter": 17, "instance": f"{r.instance(3, salt2):016x}",
+             "subject": pool_subject, "reply": pool_reply, "message": pool_message,
+             "sealed": r.seal_pool(current, fleet.public, car2, 3, 5, salt2, 17, pool_subject, pool_reply,
+                                   pool_message.encode()).hex()},
+    "ask": {"from": "car1", "version": 7, "message": r.ask(1, 7).hex()},
+    "given_roster": {"from": "car2", "to": "car1", "message": r.give_roster(3, car1.public, roster).hex()},
     "signed_request": {"requester": "car1", "node": "car2", "challenge": request[2], "verb": "DELEGATE",
                        "noun": "strike/now", "body": request[5],
                        "sig": r.text(car1.sign(r.request_to_sign(fleet.public, *request)))},

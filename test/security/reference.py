@@ -335,6 +335,68 @@ def open_group(key: bytes, datagram: bytes) -> bytes:
         raise Refused("not authentic") from error
 
 
+# --- Messages through NATS -----------------------------------------------------------------------------------------------
+
+POOL, ASK, ROSTER = 0x85, 0x86, 0x87
+
+
+def instance(member: int, salt: bytes) -> int:
+    return int.from_bytes(member.to_bytes(3, "big") + salt[:5], "big")
+
+
+def pool_texts(fleet: bytes, start: bytes, subject: str, reply: str, message: bytes) -> tuple[bytes, bytes]:
+    """The additional data, and what is signed."""
+    if "\n" in subject + reply:
+        raise Refused("a line end")
+    additional = start + f"{subject}\n{reply}".encode()
+    return additional, b"cles pool 1\n" + fleet + additional + b"\n" + message
+
+
+def seal_pool(key: bytes, fleet: bytes, me: Identity, member: int, generation: int, salt: bytes, counter: int, subject: str,
+              reply: str, message: bytes) -> bytes:
+    nonce = salt + counter.to_bytes(8, "big")
+    start = head(POOL, member) + generation.to_bytes(4, "big") + nonce
+    additional, signed = pool_texts(fleet, start, subject, reply, message)
+    plain = me.sign(signed) + message
+    return start + sodium.crypto_aead_xchacha20poly1305_ietf_encrypt(plain, additional, nonce, key)
+
+
+def open_pool(key: bytes, fleet: bytes, sender: bytes, subject: str, reply: str, sealed: bytes) -> bytes:
+    if len(sealed) < 112 or sealed[0] != POOL:
+        raise Refused("not POOL")
+    additional, _ = pool_texts(fleet, sealed[:32], subject, reply, b"")
+    try:
+        plain = sodium.crypto_aead_xchacha20poly1305_ietf_decrypt(sealed[32:], additional, sealed[8:32], key)
+    except Exception as error:
+        raise Refused("not authentic") from error
+    verify(sender, pool_texts(fleet, sealed[:32], subject, reply, plain[64:])[1], plain[:64])
+    return plain[64:]
+
+
+def ask(member: int, version: int) -> bytes:
+    return head(ASK, member) + version.to_bytes(4, "big")
+
+
+def read_ask(message: bytes) -> tuple[int, int]:
+    """The member, and the version of its roster."""
+    if len(message) != 8 or message[0] != ASK:
+        raise Refused("not ASK")
+    return int.from_bytes(message[1:4], "big"), int.from_bytes(message[4:], "big")
+
+
+def give_roster(member: int, receiver: bytes, line: bytes) -> bytes:
+    return head(ROSTER, member) + sodium.crypto_box_seal(line, x25519_of(receiver))
+
+
+def take_roster(receiver: Identity, message: bytes) -> bytes:
+    if not 52 < len(message) <= 52 + ROSTER_LIMIT or message[0] != ROSTER:
+        raise Refused("not ROSTER")
+    try:
+        return sodium.crypto_box_seal_open(message[4:], receiver.dh_public, receiver.dh_secret)
+    except Exception as error:
+        raise Refused("sealed for somebody else") from error
+
+
 class ReplayWindow:
     """Accepts each counter once, from `first` on, and none that is 1024 or more below the highest."""
 

@@ -276,6 +276,41 @@ class Datagrams(unittest.TestCase):
         with self.assertRaises(r.Refused):
             r.open_group(bytes.fromhex(VECTORS["group_keys"]["next"]), datagram)
 
+    def open_pool(self, sealed: bytes, key="current", sender=CAR2, **changes) -> bytes:
+        vector = {**VECTORS["pool"], **changes}
+        return r.open_pool(bytes.fromhex(VECTORS["group_keys"][key]), FLEET.public, sender.public, vector["subject"],
+                           vector["reply"], sealed)
+
+    def test_messages_through_nats_are_opened(self):
+        vector = VECTORS["pool"]
+        salt, sealed = bytes.fromhex(vector["salt"]), bytes.fromhex(vector["sealed"])
+        self.assertEqual(self.open_pool(sealed), vector["message"].encode())
+        self.assertEqual(r.seal_pool(bytes.fromhex(VECTORS["group_keys"]["current"]), FLEET.public, CAR2, 3,
+                                     vector["generation"], salt, vector["counter"], vector["subject"], vector["reply"],
+                                     vector["message"].encode()), sealed)
+        self.assertEqual(r.instance(3, salt), int(vector["instance"], 16))
+        for changes in ({"key": "next"}, {"sender": CAR1}, {"subject": "x"}, {"reply": ""}, {"reply": "a\nb"}):
+            with self.assertRaises(r.Refused, msg=str(changes)):
+                self.open_pool(sealed, **changes)
+        for place in range(len(sealed)):
+            with self.assertRaises(r.Refused):
+                self.open_pool(sealed[:place])
+            for bit in range(8):
+                changed = bytearray(sealed)
+                changed[place] ^= 1 << bit
+                with self.assertRaises(r.Refused):
+                    self.open_pool(bytes(changed))
+
+    def test_a_roster_is_asked_for_and_given(self):
+        asked, given = bytes.fromhex(VECTORS["ask"]["message"]), bytes.fromhex(VECTORS["given_roster"]["message"])
+        self.assertEqual(r.read_ask(asked), (1, VECTORS["ask"]["version"]))
+        self.assertEqual(r.ask(1, 7), asked)
+        self.assertEqual(r.take_roster(CAR1, given), VECTORS["roster"].encode())
+        self.assertEqual(given[:4], r.head(r.ROSTER, 3))
+        for receiver, message in ((CAR2, given), (CAR1, given[:-1]), (CAR1, given[:4]), (CAR1, b"\x86" + given[1:])):
+            with self.assertRaises(r.Refused):
+                r.take_roster(receiver, message)
+
     def test_no_bit_of_them_can_be_changed(self):
         group_key = bytes.fromhex(VECTORS["group_keys"]["current"])
         sealed = [(r.open_data, self.keys()[v["from"]], bytes.fromhex(v["datagram"])) for v in VECTORS["data"]]

@@ -58,6 +58,7 @@ class scripted_security final : public core::node_security {
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override {
         return port;
     }
+    [[nodiscard]] std::unique_ptr<core::message_seal> seal_messages() override { return {}; }
     static std::string signature(std::string_view publisher, std::string_view path, std::uint64_t seq,
                                  std::string_view epoch, std::string_view body) {
         std::string all;

@@ -7,6 +7,7 @@
 
 #include "port/environment.hpp"
 #include "port/group_port.hpp"
+#include "port/message_seal.hpp"
 #include "protocol/grammar.hpp"
 
 #include <cstdint>
@@ -82,6 +83,9 @@ class node_security {
                                                  std::string_view sig) const = 0;
     /// A port that seals what it sends with that one, and delivers what it can open, with its sender.
     [[nodiscard]] virtual std::shared_ptr<group_port> seal(std::shared_ptr<group_port> port) = 0;
+
+    /// For a new connection to NATS. This must outlive it.
+    [[nodiscard]] virtual std::unique_ptr<message_seal> seal_messages() = 0;
 
     /// Datagrams that were dropped because they were not sealed.
     [[nodiscard]] virtual std::uint64_t unsealed_datagrams() const { return 0; }

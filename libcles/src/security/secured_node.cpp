@@ -6,6 +6,7 @@
 #include "security/access/rules_file.hpp"
 #include "security/datagrams/sealed_group_port.hpp"
 #include "security/keys/signed_text.hpp"
+#include "security/messages/sealed_messages.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -168,6 +169,14 @@ std::shared_ptr<core::group_port> secured_node::seal(std::shared_ptr<core::group
                                                [this](std::uint32_t member, const std::vector<std::string>& endpoints) {
                                                    report_unanswered(member, endpoints);
                                                });
+}
+
+std::unique_ptr<core::message_seal> secured_node::seal_messages() {
+    return std::make_unique<sealed_messages>(*fleet_, system_entropy(), [this](std::string_view line) {
+        if (const auto why = offer_roster(line)) {
+            log_refused_link("a roster of another bridge is refused: " + *why);
+        }
+    });
 }
 
 void secured_node::report_unanswered(std::uint32_t member, const std::vector<std::string>& endpoints) const {

@@ -63,6 +63,7 @@ class secured_node final : public core::node_security {
                                          std::string_view path, std::string_view body,
                                          std::string_view sig) const override;
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override;
+    [[nodiscard]] std::unique_ptr<core::message_seal> seal_messages() override;
     [[nodiscard]] std::uint64_t unsealed_datagrams() const override { return datagrams_->unsealed(); }
     [[nodiscard]] std::uint32_t roster_version() const override { return fleet_->in_force().version(); }
     [[nodiscard]] const std::string& roster_line() const override { return fleet_->in_force().line(); }

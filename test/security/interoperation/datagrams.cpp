@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// A node that seals and opens datagrams, driven by datagram_interoperation_test.py: commands by standard input, one a
-// line; what the node does by standard output, and a line with a point after each command.
+// A node that seals and opens datagrams and messages, driven by datagram_interoperation_test.py: commands by standard
+// input, one a line; what the node does by standard output, and a line with a point after each command.
 //
 //   node NAME SEED FLEET EPOCH ROSTER   comes first: the name, keys and epoch in hexadecimal digits, the roster line
 //   send MEMBER LINE                    to the only address that there is
@@ -9,14 +9,27 @@
 //   wait MILLISECONDS
 //   seal LINE                           for the group
 //   open DATAGRAM                       from the group
+//
+// Of messages through NATS, the subject for replies may be '-', and the member's subject for questions is `questions`:
+//
+//   instance
+//   seal_message SUBJECT REPLY TEXT
+//   open_message SUBJECT REPLY INSTANCE QUESTIONS MESSAGE
+//   question SUBJECT INSTANCE QUESTIONS MESSAGE
+//   stated INSTANCE QUESTIONS VERSION
 #include "protocol/request_line.hpp"
 #include "security/datagrams/datagram_sessions.hpp"
 #include "security/datagrams/group_receiver.hpp"
 #include "security/datagrams/group_sender.hpp"
 #include "security/hex.hpp"
+#include "security/keys/byte_text.hpp"
+#include "security/messages/sealed_messages.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <exception>
 #include <iostream>
 #include <memory>
@@ -46,7 +59,11 @@ class node final : public datagram_sink {
         : epoch_(epoch), fleet_(std::move(name), signing_key{secret_bytes{from_hex(seed)}},
                                 read_roster(roster_line, from_hex(fleet_key))),
           sender_(fleet_, system_entropy()), receiver_(fleet_, sender_, system_entropy()),
-          sessions_(fleet_, *this, system_entropy()) {}
+          sessions_(fleet_, *this, system_entropy()),
+          messages_(fleet_, system_entropy(), [this](std::string_view line) {
+              std::cout << "roster " << line << "\n";
+              static_cast<void>(fleet_.offer(line));
+          }) {}
 
     void run(const std::string& command, const std::string& rest) {
         if (command == "send") {
@@ -64,7 +81,7 @@ class node final : public datagram_sink {
         } else if (command == "open") {
             open(from_hex(rest));
         } else {
-            throw std::runtime_error{"unknown command " + command};
+            run_message(command, rest);
         }
     }
 
@@ -81,6 +98,53 @@ class node final : public datagram_sink {
         }
         if (result.contact) {
             std::cout << "unknown " << result.contact->member << "\n";
+        }
+    }
+
+    void run_message(const std::string& command, const std::string& rest) {
+        std::istringstream words{rest};
+        const auto next = [&words] {
+            std::string word;
+            words >> word;
+            return word == "-" ? std::string{} : word;
+        };
+        if (command == "instance") {
+            std::cout << "instance " << messages_.instance() << "\n";
+        } else if (command == "seal_message") {
+            const auto subject = next();
+            const auto reply = next();
+            words >> std::ws;
+            std::string text;
+            std::getline(words, text);
+            std::cout << "sealed " << to_hex(as_bytes(messages_.seal(subject, reply, text))) << "\n";
+        } else if (command == "open_message") {
+            const auto subject = next();
+            const auto reply = next();
+            const auto instance = std::stoull(next());
+            const auto questions = next();
+            const auto result = messages_.open(subject, reply, {.instance = instance, .questions = questions},
+                                               as_text(from_hex(next())), now_);
+            constexpr std::array names{"refused", "unproven", "opened"};
+            std::cout << names.at(static_cast<std::size_t>(result.what)) << " " << result.sender << " "
+                      << result.message << "\n";
+        } else if (command == "question") {
+            const auto subject = next();
+            const auto instance = std::stoull(next());
+            const auto questions = next();
+            if (messages_.on_question(subject, {.instance = instance, .questions = questions},
+                                      as_text(from_hex(next())), now_)) {
+                std::cout << "heartbeat\n";
+            }
+        } else if (command == "stated") {
+            const auto instance = std::stoull(next());
+            const auto questions = next();
+            messages_.on_stated_roster({.instance = instance, .questions = questions},
+                                       static_cast<std::uint32_t>(std::stoul(next())), now_);
+        } else {
+            throw std::runtime_error{"unknown command " + command};
+        }
+        for (const auto& each : messages_.take_questions("questions")) {
+            std::cout << "question " << each.subject << " " << to_hex(as_bytes(each.message)) << "\n";
         }
     }
 
@@ -110,6 +174,7 @@ class node final : public datagram_sink {
     group_sender sender_;
     group_receiver receiver_;
     datagram_sessions sessions_;
+    sealed_messages messages_;
 };
 
 } // namespace

@@ -53,6 +53,7 @@ class host_security final : public simulated_security {
         return real_.is_request_signed(requester, challenge, how, path, body, sig);
     }
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override;
+    [[nodiscard]] std::unique_ptr<core::message_seal> seal_messages() override { return real_.seal_messages(); }
     [[nodiscard]] std::uint64_t unsealed_datagrams() const override { return real_.unsealed_datagrams(); }
     [[nodiscard]] std::uint32_t roster_version() const override { return real_.roster_version(); }
     [[nodiscard]] const std::string& roster_line() const override { return real_.roster_line(); }

@@ -58,6 +58,15 @@ std::array<std::uint8_t, 63> hello_prologue(const public_key& fleet, std::uint32
     return to;
 }
 
+datagram_head read_group_head(const std::uint8_t* from) noexcept {
+    datagram_head head{.kind = static_cast<datagram_kind>(from[0]),
+                       .sender = static_cast<std::uint32_t>(load_big<3>(from + 1)),
+                       .generation = static_cast<std::uint32_t>(load_big<4>(from + 4)),
+                       .counter = load_big<8>(from + 24)};
+    std::copy_n(from + 8, head.salt.size(), head.salt.begin());
+    return head;
+}
+
 std::optional<datagram_head> read_head(bytes_view datagram) noexcept {
     const auto size = datagram.size();
     if (size < data_head_bytes) {
@@ -85,10 +94,7 @@ std::optional<datagram_head> read_head(bytes_view datagram) noexcept {
         if (size < group_head_bytes + seal_bytes || size > max_sealed) {
             return {};
         }
-        head.generation = static_cast<std::uint32_t>(load_big<4>(at + 4));
-        std::copy_n(at + 8, head.salt.size(), head.salt.begin());
-        head.counter = load_big<8>(at + 24);
-        return head;
+        return read_group_head(at);
     }
     return {};
 }

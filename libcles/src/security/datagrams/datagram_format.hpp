@@ -54,7 +54,7 @@ struct node_statement {
 void write_hello_head(datagram_kind kind, std::uint32_t sender, std::uint64_t index, std::uint8_t* to);
 /// The first 20 bytes of DATA.
 void write_data_head(std::uint32_t sender, std::uint64_t index, std::uint64_t counter, std::uint8_t* to);
-/// The first 32 bytes of GROUP.
+/// The first 32 bytes of GROUP. Those of POOL differ in the kind.
 void write_group_head(std::uint32_t sender, std::uint32_t generation, const group_salt& salt, std::uint64_t counter,
                       std::uint8_t* to);
 
@@ -72,5 +72,7 @@ struct datagram_head {
     std::uint64_t counter = 0;    ///< of DATA and GROUP
 };
 [[nodiscard]] std::optional<datagram_head> read_head(bytes_view datagram) noexcept;
+/// The first 32 bytes of GROUP or of POOL, whatever the kind.
+[[nodiscard]] datagram_head read_group_head(const std::uint8_t* from) noexcept;
 
 } // namespace cles::security

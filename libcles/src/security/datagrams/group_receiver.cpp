@@ -17,32 +17,11 @@ constexpr std::size_t max_newer = 16;
 } // namespace
 
 group_receiver::group_receiver(fleet& of, group_sender& own, entropy& random)
-    : fleet_(of), own_(own), random_(random),
-      observation_(of.observe([this](const roster& before) { on_roster(before); })) {}
-
-group_receiver::known_salt* group_receiver::find(std::uint32_t member, const group_salt& salt) {
-    const auto salts = members_.find(member);
-    if (salts == members_.end()) {
-        return nullptr;
-    }
-    const auto found = std::ranges::find(salts->second, salt, &known_salt::salt);
-    return found == salts->second.end() ? nullptr : &*found;
-}
+    : fleet_(of), own_(own), random_(random), observation_(of.observe([this](const roster&) { newer_.clear(); })),
+      salts_(of) {}
 
 void group_receiver::learn(std::uint32_t member, const node_statement& stated) {
-    if (fleet_.in_force().find(member) == nullptr) {
-        return;
-    }
-    auto& salts = members_[member];
-    if (const auto known = std::ranges::find(salts, stated.salt, &known_salt::salt); known != salts.end()) {
-        known->epoch = stated.epoch; // the window stays: it knows what has been received
-        std::rotate(known, known + 1, salts.end());
-        return;
-    }
-    if (salts.size() == salts_per_member) {
-        salts.erase(salts.begin());
-    }
-    salts.push_back({.salt = stated.salt, .epoch = stated.epoch, .window = replay_window{stated.counter}});
+    salts_.learn(member, stated.salt, stated.epoch, stated.counter);
 }
 
 group_receiver::result group_receiver::open(const datagram_path& from, bytes_view datagram, time_point now) {
@@ -66,7 +45,7 @@ group_receiver::result group_receiver::open(const datagram_path& from, bytes_vie
     result opened{
         .what = verdict::unknown_salt,
         .line = {reinterpret_cast<const char*>(opened_.data()), datagram.size() - group_head_bytes - seal_bytes}};
-    if (const auto* const known = find(head->sender, head->salt)) {
+    if (const auto* const known = salts_.find(head->sender, head->salt)) {
         opened.what = verdict::opened;
         opened.epoch = known->epoch;
         opened.accepted_by = {.member = head->sender, .salt = head->salt, .counter = head->counter};
@@ -77,7 +56,7 @@ group_receiver::result group_receiver::open(const datagram_path& from, bytes_vie
 }
 
 bool group_receiver::accept(const ticket& t, ordered_by order) {
-    auto* const known = find(t.member, t.salt);
+    auto* const known = salts_.find(t.member, t.salt);
     if (known == nullptr) {
         return false;
     }
@@ -116,16 +95,6 @@ std::optional<datagram_source> group_receiver::newer_roster(const datagram_sourc
         return {};
     }
     return newer_[random_.draw<std::uint32_t>() % newer_.size()];
-}
-
-void group_receiver::on_roster(const roster& before) {
-    newer_.clear();
-    for (const auto& member : before.members()) {
-        const auto* const now = fleet_.in_force().find(member.number);
-        if (now == nullptr || !now->is(member)) {
-            members_.erase(member.number);
-        }
-    }
 }
 
 } // namespace cles::security

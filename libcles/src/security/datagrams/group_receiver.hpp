@@ -5,19 +5,15 @@
 #include "security/datagrams/datagram_path.hpp"
 #include "security/datagrams/entropy.hpp"
 #include "security/datagrams/rate_limit.hpp"
-#include "security/datagrams/replay_window.hpp"
+#include "security/datagrams/salt_table.hpp"
 #include "security/fleet/fleet.hpp"
 
-#include <boost/unordered/unordered_flat_map.hpp>
-
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 namespace cles::security {
@@ -31,8 +27,6 @@ class group_sender;
 /// then the checks of the node, then `accept`.
 class group_receiver {
   public:
-    static constexpr std::size_t salts_per_member = 8;
-
     /// \param own what this node sends itself is dropped
     group_receiver(fleet& of, group_sender& own, entropy& random);
 
@@ -68,26 +62,19 @@ class group_receiver {
     [[nodiscard]] bool accept(const ticket& t, ordered_by order);
 
   private:
-    struct known_salt {
-        group_salt salt;
-        std::uint32_t epoch;
-        replay_window window;
-    };
     struct recent_contact {
         datagram_source source;
         time_point at;
     };
 
-    [[nodiscard]] known_salt* find(std::uint32_t member, const group_salt& salt);
     [[nodiscard]] bool may_contact(const datagram_source& source, time_point now);
     [[nodiscard]] std::optional<datagram_source> newer_roster(const datagram_source& source, time_point now);
-    void on_roster(const roster& before);
 
     fleet& fleet_;
     group_sender& own_;
     entropy& random_;
     std::shared_ptr<void> observation_;
-    boost::unordered_flat_map<std::uint32_t, std::vector<known_salt>> members_; // by number; the newest salt is last
+    salt_table salts_;
     rate_limit contacts_{50};
     std::deque<recent_contact> contacted_; // in this second
     rate_limit roster_contacts_{10};

@@ -5,6 +5,7 @@
 
 #include "json/json_members.hpp"
 #include "protocol/request_line.hpp"
+#include "security/keys/byte_text.hpp"
 
 #include <utility>
 
@@ -14,14 +15,6 @@ namespace {
 constexpr std::size_t max_unknown = 256; // members
 constexpr std::size_t max_endpoints = 16;
 constexpr std::size_t depth = 8; // of an announcement
-
-bytes_view as_bytes(std::string_view text) noexcept {
-    return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
-}
-
-std::string_view as_text(bytes_view bytes) noexcept {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
 
 // Of an announcement; empty for other lines.
 std::vector<std::string> endpoints_in(std::string_view line) {
