@@ -102,6 +102,9 @@ subrequest_outcome any_request::outcome() {
 
 // "north.any" of a pool that was not asked; empty if all were.
 std::string any_request::next_pool() const {
+    if (!may_forward_for(routing_->host(), requester_)) {
+        return {};
+    }
     for (const auto& pool : other_pools_for(routing_->host(), *request_, peer_)) {
         auto target = pool.name + ".any";
         if (pool.live && std::find(asked_.begin(), asked_.end(), target) == asked_.end()) {
@@ -254,7 +257,10 @@ void scatter_gather::add_pools() {
         auto& added = parts_.emplace_back();
         added.node = pool.name + ".all";
         added.pool = std::move(pool.name);
-        if (!pool.live) {
+        if (!may_forward_for(routing_->host(), requester_)) {
+            added.failure = protocol::failure{.code = errc::denied,
+                                              .message = may_not_forward(routing_->host(), requester_, added.node)};
+        } else if (!pool.live) {
             added.failure = protocol::failure{.code = errc::unavailable,
                                               .message = added.pool + " has no bridge that can be reached"};
         }

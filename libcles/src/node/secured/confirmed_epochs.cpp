@@ -2,16 +2,22 @@
 #include "node/secured/confirmed_epochs.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace cles::core {
 
 bool confirmed_epochs::contain(std::string_view node, std::uint32_t epoch) const noexcept {
-    const auto found = nodes_.find(node);
-    return found != nodes_.end() && found->second.epoch == epoch;
+    const auto* const said = find(node);
+    return said != nullptr && said->epoch == epoch;
 }
 
-void confirmed_epochs::confirm(std::string_view node, std::uint32_t epoch, time_point now) {
-    of(node, now).epoch = epoch;
+const confirmed_epoch* confirmed_epochs::find(std::string_view node) const noexcept {
+    const auto found = nodes_.find(node);
+    return found != nodes_.end() && found->second.said ? &*found->second.said : nullptr;
+}
+
+void confirmed_epochs::confirm(std::string_view node, confirmed_epoch said, time_point now) {
+    of(node, now).said = std::move(said);
 }
 
 time_point confirmed_epochs::next_question(std::string_view node) const noexcept {

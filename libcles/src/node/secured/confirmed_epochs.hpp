@@ -11,8 +11,16 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace cles::core {
+
+/// What a node has said of its present incarnation, when it was asked.
+struct confirmed_epoch {
+    std::uint32_t epoch = 0;
+    /// Whose updates it signs. Nothing: only its announcement counts.
+    std::optional<std::vector<std::string>> signed_tasks{};
+};
 
 /// The epochs that other nodes have confirmed, and when they were asked. Beyond the limit, the node that was asked
 /// first is forgotten.
@@ -24,7 +32,9 @@ class confirmed_epochs {
     explicit confirmed_epochs(std::size_t most) noexcept : max_entries_(most) {}
 
     [[nodiscard]] bool contain(std::string_view node, std::uint32_t epoch) const noexcept;
-    void confirm(std::string_view node, std::uint32_t epoch, time_point now);
+    void confirm(std::string_view node, confirmed_epoch said, time_point now);
+    /// Null if it has confirmed none.
+    [[nodiscard]] const confirmed_epoch* find(std::string_view node) const noexcept;
     /// When the node may be asked again; the past if it was not asked.
     [[nodiscard]] time_point next_question(std::string_view node) const noexcept;
     void on_asked(std::string_view node, time_point now);
@@ -32,7 +42,7 @@ class confirmed_epochs {
 
   private:
     struct entry {
-        std::optional<std::uint32_t> epoch{};
+        std::optional<confirmed_epoch> said{};
         time_point asked = time_point::min();
         time_point used{};
     };

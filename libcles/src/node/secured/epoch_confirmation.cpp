@@ -10,6 +10,8 @@
 #include "port/node_security.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <utility>
 
 namespace cles::core {
 namespace {
@@ -34,8 +36,8 @@ std::string epoch_question(std::string_view node, std::string_view challenge) {
     return std::string{node} + ":" + path_of(challenge);
 }
 
-std::optional<std::uint32_t> read_confirmed_epoch(std::string_view json, std::string_view node,
-                                                  std::string_view challenge, const node_security& security) {
+std::optional<confirmed_epoch> read_confirmed_epoch(std::string_view json, std::string_view node,
+                                                    std::string_view challenge, const node_security& security) {
     std::string_view body;
     std::string sig;
     std::uint64_t seq = 0;
@@ -54,7 +56,7 @@ std::optional<std::uint32_t> read_confirmed_epoch(std::string_view json, std::st
         !security.is_signed(node, path_of(challenge), seq, protocol::epoch_text(epoch), body, sig)) {
         return {};
     }
-    return epoch;
+    return confirmed_epoch{epoch, std::move(said.signed_tasks)};
 }
 
 // What it announces to others now, also if it has nobody to announce it to.

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "node/secured/confirmed_epochs.hpp"
 #include "node/session/reply_writer.hpp"
 #include "protocol/request_line.hpp"
 
-#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -19,9 +19,9 @@ struct node_state;
 
 /// The noun that asks that node for its epoch.
 std::string epoch_question(std::string_view node, std::string_view challenge);
-/// The epoch in the reply; nothing if that node has not signed it for this challenge.
-std::optional<std::uint32_t> read_confirmed_epoch(std::string_view json, std::string_view node,
-                                                  std::string_view challenge, const node_security& security);
+/// What the reply says; nothing if that node has not signed it for this challenge.
+std::optional<confirmed_epoch> read_confirmed_epoch(std::string_view json, std::string_view node,
+                                                    std::string_view challenge, const node_security& security);
 
 /// Serves a request for `cles/announced/<challenge>`.
 void serve_announced(node_state& host, reply_writer& replies, const protocol::request_line& request);

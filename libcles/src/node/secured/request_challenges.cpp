@@ -25,27 +25,37 @@ request_challenges::request_key request_challenges::key_of(const identity& link,
 std::optional<protocol::failure> request_challenges::refusal(const identity& link, const protocol::request_line& r,
                                                              time_point due, time_point now) {
     auto what = key_of(link, r);
-    const auto at = std::find_if(given_.begin(), given_.end(), [&](const given& each) { return each.what == what; });
-    std::optional<given> open;
-    if (at != given_.end()) { // another attempt replaces it, and a signature uses it up
-        open = std::move(*at);
-        given_.erase(at);
-    }
+    const auto here = std::ranges::find(given_, what, &given::what);
     if (r.sig.empty()) {
+        if (here != given_.end()) { // another attempt replaces it
+            given_.erase(here);
+        }
         return challenge(std::move(what), r.noun.task, due, now);
     }
-    const auto denied = [&](std::string_view why) {
-        return protocol::failure{.code = errc::denied,
-                                 .message = node_.name + " does not accept the signature for '" +
-                                            std::string{r.noun.task} + "': " + std::string{why}};
+    const auto is_signed = [&](const given& each) {
+        return each.due > now &&
+               node_.security->is_request_signed(what.requester, each.challenge, what.how, what.path, r.body, r.sig);
     };
-    if (!open || open->due <= now) {
-        return denied("there is no challenge for this request, or it has expired");
+    // Another node may forward the second attempt than the first one, such as another bridge of a pool.
+    const auto valid = std::ranges::find_if(
+        given_, [&](const given& each) { return each.what.is_same_request(what) && is_signed(each); });
+    if (valid != given_.end()) {
+        given_.erase(valid);
+        return std::nullopt;
     }
-    if (!node_.security->is_request_signed(what.requester, open->challenge, what.how, what.path, r.body, r.sig)) {
-        return denied("it is not that of " + what.requester + " for this request");
+    const bool is_open = here != given_.end() && here->due > now;
+    if (here != given_.end()) { // a wrong signature uses it up
+        given_.erase(here);
     }
-    return std::nullopt;
+    return protocol::failure{.code = errc::denied,
+                             .message = node_.name + " does not accept the signature for '" + std::string{r.noun.task} +
+                                        "': " +
+                                        (is_open ? "it is not that of " + what.requester + " for this request"
+                                                 : "there is no challenge for this request, or it has expired")};
+}
+
+bool request_challenges::request_key::is_same_request(const request_key& other) const {
+    return requester == other.requester && how == other.how && path == other.path && body == other.body;
 }
 
 protocol::failure request_challenges::challenge(request_key what, std::string_view task, time_point due,

@@ -19,7 +19,7 @@ namespace cles::core {
 struct node_state;
 
 /// The challenges that this node has given to requesters of signed tasks (docs/security.md, "Signed requests"). Each is
-/// valid once, on the link on which it was given, for the same request, until its first attempt's deadline.
+/// valid once, for the same request, until its first attempt's deadline or the end of the link on which it was given.
 class request_challenges {
   public:
     /// Beyond these, the oldest one is forgotten.
@@ -47,6 +47,7 @@ class request_challenges {
         std::size_t body = 0; // its hash; the signature covers the body itself
 
         bool operator==(const request_key&) const = default;
+        [[nodiscard]] bool is_same_request(const request_key& other) const;
     };
     struct given {
         request_key what;

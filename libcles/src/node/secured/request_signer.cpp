@@ -43,10 +43,18 @@ bool may_sign_for(local_node& host, const repeatable_request& r, const std::stri
     if (r.target == "self") {
         return r.at.empty() && node == own;
     }
-    if (r.target == "any" || r.target == "all") {
+    const auto member = member_of(host.node(), r.target);
+    if (member == "any" || member == "all") {
         return permits(host.node(), own, node, r.how, r.path);
     }
-    return node == r.target;
+    return node == member;
+}
+
+// Where a node is reached that a request for `target` has led to: in the pool that was named, since its name alone may
+// not be known here.
+std::string address_in_pool(local_node& host, const std::string& target, const std::string& node) {
+    const auto member = member_of(host.node(), target);
+    return protocol::is_reserved_target(member) ? target.substr(0, target.size() - member.size()) + node : target;
 }
 
 /// The node that has asked for a signature with this failure, if it may get one; else nothing. `sig` is the signature.
@@ -71,11 +79,12 @@ std::optional<std::string> signing_node(local_node& host, const repeatable_reque
 
 void send_signed(local_node& host, request_signer& by, const repeatable_request& r, const std::string& node,
                  std::string_view sig, detail::pending_ptr reply, outbound::progress_function progress) {
-    const auto noun = node + ":" + r.path;
+    const auto to = address_in_pool(host, r.target, node);
+    const auto noun = to + ":" + r.path;
     const auto adverbs = std::string{"sig="}.append(sig);
     host.flush_scheduler().run_user_call([&] {
         const auto id = host.peer_channels().send(
-            node, r.at,
+            to, r.at,
             {.verb = r.how, .noun = noun, .carried = r.carried, .hops = r.hops, .adverbs = adverbs, .body = r.body},
             r.deadline, std::move(reply), std::move(progress));
         if (id != 0) {
@@ -307,7 +316,7 @@ class first_attempt final : public attempt_of_request {
         std::map<std::string, std::string> signatures;
         for (const auto& [node, error] : whole->errors()) {
             std::string sig;
-            if (signing_node(*host, request_, error, sig) == node) {
+            if (signing_node(*host, request_, error, sig) == member_of(host->node(), node)) {
                 signatures.emplace(node, std::move(sig));
             }
         }

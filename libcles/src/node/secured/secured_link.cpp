@@ -13,7 +13,8 @@ namespace cles::core {
 secured_link::secured_link(std::shared_ptr<node_state> host, confirmed_epochs& confirmed, line_sink& out,
                            outbound& asking, const identity& peer, unconfirmed_updates::deliver_function deliver)
     : node_(std::move(host)), confirmed_(confirmed), out_(out), asking_(asking), peer_(peer),
-      unconfirmed_(std::make_shared<unconfirmed_updates>(*node_, confirmed, asking, std::move(deliver))) {}
+      unconfirmed_(std::make_shared<unconfirmed_updates>(*node_, confirmed, asking, peer.transport == "pool",
+                                                         std::move(deliver))) {}
 
 bool secured_link::serve(const protocol::request_line& r, time_point now) {
     if (!is_hello(r)) {
@@ -33,7 +34,12 @@ bool secured_link::admits(const protocol::request_line& update) {
     if (peer_.transport == "inproc") { // checked before: it comes from this process
         return true;
     }
-    if (check_signature(*node_, update, peer_.name == update.noun.target) == update_check::refused) {
+    // What a node of another pool signs is known once its present incarnation has said so.
+    if (peer_.transport == "pool" && !confirmed_.contain(update.noun.target, *update.epoch)) {
+        unconfirmed_->hold(update, node_->time.now());
+        return false;
+    }
+    if (check_signature(*node_, confirmed_, update, peer_.name == update.noun.target) == update_check::refused) {
         ++node_->counts.updates_unsigned;
         return false;
     }

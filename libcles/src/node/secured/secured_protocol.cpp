@@ -66,11 +66,11 @@ bool secured_protocol::serve_reserved(reply_writer& replies, const protocol::req
 }
 
 std::optional<bool> secured_protocol::must_be_signed(std::string_view publisher, std::string_view task) const {
-    return core::must_be_signed(node_, publisher, task);
+    return core::must_be_signed(node_, confirmed_, publisher, task);
 }
 
 update_check secured_protocol::check(const protocol::request_line& update, bool direct) const {
-    return check_signature(node_, update, direct);
+    return check_signature(node_, confirmed_, update, direct);
 }
 
 std::string secured_protocol::announce(announcement& said, std::uint64_t& seq, bool in_group, bool by_gossip) {

@@ -9,14 +9,17 @@
 
 namespace cles::core {
 
+class confirmed_epochs;
 struct node_state;
 
-/// Whether updates of that task must be signed; nothing if the publisher's announcement is not known.
-[[nodiscard]] std::optional<bool> must_be_signed(const node_state& n, std::string_view publisher,
-                                                 std::string_view task);
+/// Whether updates of that task must be signed; nothing if neither the publisher's announcement is known, nor what it
+/// has confirmed.
+[[nodiscard]] std::optional<bool> must_be_signed(const node_state& n, const confirmed_epochs& confirmed,
+                                                 std::string_view publisher, std::string_view task);
 
-/// \param direct whether its publisher itself has sent it on a link; otherwise the publisher's announcement must be
-/// known \pre the node is secured
-[[nodiscard]] update_check check_signature(const node_state& n, const protocol::request_line& update, bool direct);
+/// \param direct whether its publisher itself has sent it on a link; otherwise it must be known whether the update must
+/// be signed \pre the node is secured
+[[nodiscard]] update_check check_signature(const node_state& n, const confirmed_epochs& confirmed,
+                                           const protocol::request_line& update, bool direct);
 
 } // namespace cles::core

@@ -2,6 +2,7 @@
 #include "node/secured/unconfirmed_updates.hpp"
 
 #include "node/secured/epoch_confirmation.hpp"
+#include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
 
 #include <algorithm>
@@ -19,7 +20,8 @@ class unconfirmed_updates::reply final : public detail::pending {
     verdict offer(std::string_view json) override {
         const std::unique_ptr<reply> self{this};
         if (const auto owner = owner_.lock()) {
-            owner->on_answer(publisher_, read_confirmed_epoch(json, publisher_, challenge_, *owner->node_.security));
+            const auto member = member_of(owner->node_, publisher_);
+            owner->on_answer(publisher_, read_confirmed_epoch(json, member, challenge_, *owner->node_.security));
         }
         return verdict::completed;
     }
@@ -72,14 +74,21 @@ void unconfirmed_updates::ask(const std::string& publisher, time_point now) {
 }
 
 // Delivered in a turn of its own, since this may be inside the processing of a line.
-void unconfirmed_updates::on_answer(const std::string& publisher, std::optional<std::uint32_t> epoch) {
+void unconfirmed_updates::on_answer(const std::string& publisher, std::optional<confirmed_epoch> said) {
     const auto now = node_.time.now();
     asked_.erase(publisher);
-    if (epoch) {
-        confirmed_.confirm(publisher, *epoch, now);
+    const bool is_confirmed = said.has_value();
+    const auto epoch = is_confirmed ? said->epoch : 0;
+    if (said) {
+        if (!crosses_pools_) { // its announcement tells, unless it is of another pool, too
+            const auto* const before = confirmed_.find(publisher);
+            const bool is_same = before != nullptr && before->epoch == said->epoch;
+            said->signed_tasks = is_same ? before->signed_tasks : std::nullopt;
+        }
+        confirmed_.confirm(publisher, std::move(*said), now);
     }
     std::erase_if(held_, [&](const held_update& each) {
-        if (!each.asked || each.publisher != publisher || epoch == each.epoch) {
+        if (!each.asked || each.publisher != publisher || (is_confirmed && epoch == each.epoch)) {
             return false;
         }
         bytes_ -= each.line.size();

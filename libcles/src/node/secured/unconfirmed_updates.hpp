@@ -30,8 +30,11 @@ class unconfirmed_updates final : public std::enable_shared_from_this<unconfirme
     using deliver_function = std::function<void(std::string_view line)>;
 
     /// What it refers to must outlive this; `deliver` is not called from inside `hold`.
-    unconfirmed_updates(node_state& host, confirmed_epochs& confirmed, outbound& asking, deliver_function deliver)
-        : node_(host), confirmed_(confirmed), outbound_(asking), deliver_(std::move(deliver)) {}
+    /// \param crosses_pools whether the publishers are of other pools, whose announcements do not arrive
+    unconfirmed_updates(node_state& host, confirmed_epochs& confirmed, outbound& asking, bool crosses_pools,
+                        deliver_function deliver)
+        : node_(host), confirmed_(confirmed), outbound_(asking), crosses_pools_(crosses_pools),
+          deliver_(std::move(deliver)) {}
     unconfirmed_updates(const unconfirmed_updates&) = delete;
     unconfirmed_updates& operator=(const unconfirmed_updates&) = delete;
     ~unconfirmed_updates() = default;
@@ -50,7 +53,7 @@ class unconfirmed_updates final : public std::enable_shared_from_this<unconfirme
     };
 
     void on_deadline(time_point now) override;
-    void on_answer(const std::string& publisher, std::optional<std::uint32_t> epoch);
+    void on_answer(const std::string& publisher, std::optional<confirmed_epoch> said);
     void ask(const std::string& publisher, time_point now);
     /// Returns false if the link ended meanwhile, and with it what this refers to.
     [[nodiscard]] bool deliver_confirmed();
@@ -58,6 +61,7 @@ class unconfirmed_updates final : public std::enable_shared_from_this<unconfirme
     node_state& node_;
     confirmed_epochs& confirmed_;
     outbound& outbound_;
+    bool crosses_pools_;
     deliver_function deliver_;
     std::list<held_update> held_;
     std::size_t bytes_ = 0;

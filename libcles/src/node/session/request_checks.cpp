@@ -6,6 +6,7 @@
 #include "port/node_security.hpp"
 #include "protocol/grammar.hpp"
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -24,9 +25,22 @@ std::string_view requester_of(const node_state& n, const identity& peer, const p
     return states_another && n.security->may_forward(by, r.from) ? r.from : by;
 }
 
+std::string_view member_of(const node_state& n, std::string_view target) {
+    if (!n.security || n.security->is_member(target)) {
+        return target;
+    }
+    const auto rest = target.substr(std::min(target.find('.'), target.size() - 1) + 1);
+    return n.security->is_member(rest) || protocol::is_reserved_target(rest) ? rest : target;
+}
+
 bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
              const protocol::noun_view& noun) {
-    return !n.security || n.security->allows(requester, provider, how, noun);
+    if (!n.security) {
+        return true;
+    }
+    const auto member = member_of(n, provider);
+    const bool is_group_elsewhere = member.size() != provider.size() && protocol::is_reserved_target(member);
+    return is_group_elsewhere || n.security->allows(requester, member, how, noun);
 }
 
 bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
@@ -44,8 +58,13 @@ bool may_forward_for(const node_state& n, std::string_view requester) {
     return !n.security || requester == n.name || n.security->may_forward(n.name, requester);
 }
 
-std::string how_to_permit_forwarding(const node_state& n, std::string_view requester) {
-    return "(cles fleet rights " + n.name + " --forwards " + std::string{requester} + ")";
+std::string how_to_permit_forwarding(std::string_view forwarder, std::string_view requester) {
+    return "(cles fleet rights " + std::string{forwarder} + " --forwards " + std::string{requester} + ")";
+}
+
+std::string may_not_forward(const node_state& n, std::string_view requester, std::string_view target) {
+    return n.name + " may not forward requests of " + std::string{requester} + " to " + std::string{target} + " " +
+           how_to_permit_forwarding(n.name, requester);
 }
 
 namespace {
@@ -66,6 +85,10 @@ bool is_permitted(const node_state& n, const identity& peer, const protocol::req
     if (requester.empty() || !n.security->is_member(requester)) {
         return false;
     }
+    // What a bridge forwards has the rights of the requester that it states, or none.
+    if (peer.transport == "pool" && !r.from.empty() && r.from != requester) {
+        return false;
+    }
     if (is_exempt(r.noun) || r.noun.target == "any" || r.noun.target == "all") {
         return true;
     }
@@ -81,8 +104,7 @@ std::string denial(const node_state& n, const identity& peer, const protocol::re
     const bool is_for_another =
         !requester.empty() && !protocol::is_reserved_target(r.noun.target) && !is_local_target(n, r);
     if (is_for_another && n.security->is_member(requester) && !may_forward_for(n, requester)) {
-        return n.name + " may not forward requests of " + std::string{requester} + " to " + std::string{r.noun.target} +
-               " " + how_to_permit_forwarding(n, requester);
+        return may_not_forward(n, requester, r.noun.target);
     }
     return n.name + " does not allow " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.task} + "'";
 }

@@ -40,7 +40,11 @@ bool is_in_via(std::string_view via, std::string_view name);
 /// else the peer's. Empty if it is no member, and without security.
 std::string_view requester_of(const node_state& n, const identity& peer, const protocol::request_line& request);
 
-/// Whether `requester` may send `provider` a request for this noun. True without security.
+/// The member of a secured fleet that is meant: "car1" of "north.car1", which is a node of another pool.
+std::string_view member_of(const node_state& n, std::string_view target);
+
+/// Whether `requester` may send `provider` a request for this noun. True without security. For `any` and `all` of
+/// another pool, the rights are checked there, for each node.
 bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
              const protocol::noun_view& noun);
 /// The same for a path of `provider`, such as that of a topic.
@@ -49,8 +53,10 @@ bool permits(const node_state& n, std::string_view requester, std::string_view p
 
 /// Whether this node may forward for the requester; itself, and without security, for all.
 bool may_forward_for(const node_state& n, std::string_view requester);
-/// How to permit that: "(cles fleet rights car1 --forwards sat1)".
-[[gnu::cold]] std::string how_to_permit_forwarding(const node_state& n, std::string_view requester);
+/// That this node lacks that right: "car1 may not forward requests of sat1 to car2 (...)".
+[[gnu::cold]] std::string may_not_forward(const node_state& n, std::string_view requester, std::string_view target);
+/// How to permit that a node forwards for another one: "(cles fleet rights car1 --forwards sat1)".
+[[gnu::cold]] std::string how_to_permit_forwarding(std::string_view forwarder, std::string_view requester);
 
 /// Whether the access rules allow the request.
 bool allows(const node_state& n, const identity& peer, const protocol::request_line& request);

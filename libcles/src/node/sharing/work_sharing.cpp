@@ -97,7 +97,8 @@ bool work_sharing::may_forward_for(std::string_view requester) {
         has_logged_why_ = true;
         const std::string who{requester};
         node_.post_log(log_level::info, "jobs of " + who + " do not move to other nodes, because " + node_.name +
-                                            " may not forward for it " + how_to_permit_forwarding(node_, requester));
+                                            " may not forward for it " +
+                                            how_to_permit_forwarding(node_.name, requester));
     }
     return false;
 }

@@ -19,10 +19,10 @@ const cles::time_point start{1h};
 BOOST_AUTO_TEST_CASE(the_last_confirmed_epoch_of_a_node_counts) {
     cles::core::confirmed_epochs known{4};
     BOOST_TEST(!known.contain("car1", 1));
-    known.confirm("car1", 1, start);
+    known.confirm("car1", {1}, start);
     BOOST_TEST(known.contain("car1", 1));
     BOOST_TEST(!known.contain("car2", 1));
-    known.confirm("car1", 2, start);
+    known.confirm("car1", {2}, start);
     BOOST_TEST(known.contain("car1", 2));
     BOOST_TEST(!known.contain("car1", 1));
 }
@@ -38,16 +38,16 @@ BOOST_AUTO_TEST_CASE(a_node_is_asked_once_a_second) {
 
 BOOST_AUTO_TEST_CASE(they_are_bounded) {
     cles::core::confirmed_epochs known{2};
-    known.confirm("car1", 1, start);
-    known.confirm("car2", 1, start + 1s);
-    known.confirm("car1", 1, start + 2s);
-    known.confirm("car3", 1, start + 3s);
+    known.confirm("car1", {1}, start);
+    known.confirm("car2", {1}, start + 1s);
+    known.confirm("car1", {1}, start + 2s);
+    known.confirm("car3", {1}, start + 3s);
     BOOST_TEST(known.size() == 2U);
     BOOST_TEST(known.contain("car1", 1));
     BOOST_TEST(!known.contain("car2", 1));
     cles::core::confirmed_epochs none{0};
-    none.confirm("car1", 1, start);
-    none.confirm("car2", 1, start);
+    none.confirm("car1", {1}, start);
+    none.confirm("car2", {1}, start);
     BOOST_TEST(none.size() == 1U);
 }
 

@@ -151,11 +151,27 @@ BOOST_AUTO_TEST_CASE(another_attempt_replaces_it) {
     BOOST_TEST(ask(second(signature(newest.challenge))).error.empty());
 }
 
-BOOST_AUTO_TEST_CASE(it_belongs_to_its_link) {
+// Another node may forward the second attempt than the first one.
+BOOST_AUTO_TEST_CASE(the_second_attempt_may_come_on_another_link) {
     cles::test::test_link other{node, "car2"};
+    cles::test::test_link of_another_member{node, "car3"};
     const auto given = ask(first);
-    BOOST_TEST(read(other.ask(second(signature(given.challenge)))).error == "denied");
-    BOOST_TEST(ask(second(signature(given.challenge))).error.empty());
+    BOOST_TEST(read(of_another_member.ask(second(signature(given.challenge)))).error == "denied");
+    BOOST_TEST(read(other.ask(second("x"))).error == "denied"); // does not use it up
+    BOOST_TEST(runs == 0);
+    BOOST_TEST(read(other.ask(second(signature(given.challenge)))).error.empty());
+    BOOST_TEST(ask(second(signature(given.challenge))).error == "denied");
+    BOOST_TEST(runs == 1);
+}
+
+BOOST_AUTO_TEST_CASE(each_link_has_its_own_challenge_for_the_same_request) {
+    cles::test::test_link other{node, "car2"};
+    const auto here = ask(first);
+    const auto there = read(other.ask(first));
+    BOOST_TEST(read(other.ask(second(signature(here.challenge)))).error.empty());
+    BOOST_TEST(ask(second(signature(there.challenge))).error.empty());
+    BOOST_TEST(ask(second(signature(there.challenge))).error == "denied");
+    BOOST_TEST(runs == 2);
 }
 
 BOOST_AUTO_TEST_CASE(it_is_forgotten_with_its_link) {

@@ -52,7 +52,7 @@ struct fixture {
     fixture() {
         group.feeds().add(feed, node.clock.now());
         static_cast<void>(port.take());
-        node.secured().confirmed().confirm("car2", 0x5f3a09c2, node.clock.now());
+        node.secured().confirmed().confirm("car2", {0x5f3a09c2}, node.clock.now());
     }
     ~fixture() { group.stop(); }
     fixture(const fixture&) = delete;
