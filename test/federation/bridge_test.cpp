@@ -200,7 +200,7 @@ BOOST_FIXTURE_TEST_CASE(what_a_lost_bridge_took_is_unavailable, two_pools) {
 }
 
 BOOST_FIXTURE_TEST_CASE(the_last_bridge_of_a_pool_takes_the_link_with_it, two_pools) {
-    gate.core().leave();
+    gate.core().leave(nats.now());
     gate.core().say_left();
     nats.run_for(10ms);
     BOOST_TEST(!hub.core().is_live("north"));
@@ -211,7 +211,7 @@ BOOST_FIXTURE_TEST_CASE(a_bridge_that_leaves_completes_what_it_has_taken, two_po
     gate.answer_after = 5s;
     const auto id = hub.ask("north", "DELEGATE car9:echo deadline=10000 {\"n\":1}");
     nats.run_for(10ms);
-    gate.core().leave();
+    gate.core().leave(nats.now());
     BOOST_TEST(!gate.subscribes("cles.north.push.car9.echo", true));
     nats.run_for(6s);
     BOOST_TEST(hub.answer(id) == "{\"n\":1}");
@@ -308,6 +308,15 @@ BOOST_FIXTURE_TEST_CASE(programs_that_use_nats_are_served, two_pools) {
     nats.publish("cles.north.push.car9.echo", "_INBOX.ghi", "{\"n\":2}");
     nats.run_for(20ms);
     BOOST_TEST((nats.recorded("_INBOX.ghi") == std::vector<std::string>{"_INBOX.ghi {\"n\":2}"}));
+}
+
+// Permissions of NATS, which state verb, node and task, do not cover the subject of a bridge.
+BOOST_FIXTURE_TEST_CASE(a_request_on_the_subject_of_a_bridge_needs_security, two_pools) {
+    nats.publish("cles.north.bridge." + gate.core().self().instance + ".request", "_INBOX.abc", "PUSH car9:echo {}");
+    nats.run_for(10ms);
+    BOOST_TEST(gate.executed.empty());
+    BOOST_TEST(gate.core().counted().messages_refused == 1U);
+    BOOST_TEST(nats.recorded("_INBOX.").empty());
 }
 
 BOOST_FIXTURE_TEST_CASE(what_concerns_a_link_does_not_cross, two_pools) {

@@ -28,7 +28,9 @@ BOOST_AUTO_TEST_CASE(it_is_read_as_written) {
                                          .names = digest,
                                          .replaces = digest,
                                          .leaving = true,
-                                         .starting = true};
+                                         .starting = true,
+                                         .closing = true,
+                                         .roster = 7};
     BOOST_TEST((parse_heartbeat(text_of(full)) == full));
 }
 

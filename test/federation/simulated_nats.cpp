@@ -98,8 +98,8 @@ void simulated_nats::publish(const std::string& subject, const std::string& repl
 
 // -- a site --------------------------------------------------------------------------------------------------------
 
-site::site(simulated_nats& by, std::string pool, std::string node)
-    : names{node}, nats_(by), pool_(std::move(pool)), node_(std::move(node)) {
+site::site(simulated_nats& by, std::string pool, std::string node, std::optional<site_security> security)
+    : names{node}, nats_(by), pool_(std::move(pool)), node_(std::move(node)), security_(std::move(security)) {
     nats_.add(*this);
     restart();
 }
@@ -112,13 +112,21 @@ void site::restart() {
     subscriptions_.clear();
     running_.clear();
     bound.clear();
-    bridge_ = std::make_unique<bridge>(bridge::settings{.pool = pool_, .node = node_}, *this);
+    channel_.reset();
+    bridge_ = std::make_unique<bridge>(bridge::settings{.pool = pool_, .node = node_}, *this,
+                                       security_ ? static_cast<bridge_trust*>(this) : nullptr);
 }
 
 void site::connect() {
     subscriptions_.clear();
     connection_ = ++last_connection_;
-    bridge_->on_connected((std::uint64_t{nats_.random()()} << 32U) | nats_.random()(), 1U << 16U, nats_.now());
+    constexpr std::size_t most = 1U << 16U;
+    if (security_) {
+        channel_.emplace(security_->make_seal(), pool_);
+        bridge_->on_connected(channel_->instance(), most - core::message_seal::overhead, nats_.now());
+    } else {
+        bridge_->on_connected((std::uint64_t{nats_.random()()} << 32U) | nats_.random()(), most, nats_.now());
+    }
     tick();
 }
 
@@ -172,11 +180,39 @@ void site::update(const std::string& noun, std::uint64_t seq) {
 }
 
 void site::receive(const std::string& subject, const std::string& reply, const std::string& message) {
-    bridge_->on_message(subject, reply, message, nats_.now());
+    if (channel_) {
+        open(subject, reply, message);
+    } else {
+        bridge_->on_message(subject, reply, message, nats_.now());
+    }
     for (const auto& [on, line] : std::exchange(delivered_, {})) {
         serve(on, line);
     }
     bridge_->on_batch();
+    tick();
+}
+
+void site::open(const std::string& subject, const std::string& reply, const std::string& message) {
+    using outcome = sealed_channel::outcome;
+    const auto found = channel_->receive(subject, reply, message, nats_.now());
+    switch (found.what) {
+    case outcome::opened:
+        bridge_->on_message(subject, reply, found.message, nats_.now(), {found.sender, found.instance});
+        break;
+    case outcome::unproven: bridge_->on_unproven(subject, reply, nats_.now()); break;
+    case outcome::refused: bridge_->on_refused(subject, found.why, nats_.now()); break;
+    case outcome::consumed: break;
+    }
+    if (found.heartbeat_soon) {
+        bridge_->announce_soon(nats_.now());
+    }
+    for (const auto& each : channel_->take_questions()) {
+        nats_.publish(each.subject, each.reply, each.message);
+    }
+}
+
+void site::change_security() {
+    bridge_->on_security_changed(nats_.now());
     tick();
 }
 
@@ -194,9 +230,16 @@ bool site::publish(std::string subject, std::string reply, std::string message, 
     if (is_full && in == room::shared) {
         return false;
     }
-    if (connection_ != 0) {
-        nats_.publish(subject, reply, message);
+    if (connection_ == 0) {
+        return true;
     }
+    if (channel_) {
+        message = channel_->seal(subject, reply, message);
+        if (message.empty()) { // it is no member
+            return false;
+        }
+    }
+    nats_.publish(subject, reply, message);
     return true;
 }
 
@@ -292,5 +335,24 @@ void site::lose_binding(const bridge_link&, const std::string& noun, std::string
 }
 
 void site::log(log_level, const std::string& text) { logged.push_back(text); }
+
+// -- of a secured fleet --------------------------------------------------------------------------------------------
+
+bool site::may_forward(std::string_view member) const { return !distrusted.contains(std::string{member}); }
+
+std::string site::how_to_permit(std::string_view member) const { return "(permit " + std::string{member} + ")"; }
+
+std::optional<protocol::failure> site::refusal(std::string_view member, const protocol::request_line& bind) const {
+    const auto from = bind.from.empty() ? "-" : std::string{bind.from};
+    binds.push_back(std::string{member} + " " + from + " " + std::string{bind.noun.target} + ":" +
+                    std::string{bind.noun.path});
+    return bind.noun.task == "secret" ? std::optional{protocol::failure{.code = errc::denied, .message = "secret"}}
+                                      : std::nullopt;
+}
+
+void site::on_stated_roster(const bridge_id& by, std::uint32_t version) {
+    rosters.push_back(by.instance + " " + std::to_string(version));
+    channel_->on_stated_roster(by, version, nats_.now());
+}
 
 } // namespace cles::bridging::test

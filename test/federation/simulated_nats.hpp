@@ -2,12 +2,15 @@
 #pragma once
 
 #include "federation/bridge.hpp"
+#include "federation/sealed_channel.hpp"
+#include "port/message_seal.hpp"
 
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <random>
 #include <set>
 #include <string>
@@ -69,11 +72,17 @@ class simulated_nats {
     std::vector<std::string> record_;
 };
 
+/// What makes a site one of a secured fleet.
+struct site_security {
+    std::function<std::unique_ptr<core::message_seal>()> make_seal; ///< for a connection
+    std::function<std::uint32_t()> roster_version;
+};
+
 /// A bridge and its node. The node answers requests for `echo` with their body, at once or after `answer_after`, and
 /// keeps what it has executed.
-class site final : public bridge_output {
+class site final : public bridge_output, private bridge_trust {
   public:
-    site(simulated_nats& by, std::string pool, std::string node);
+    site(simulated_nats& by, std::string pool, std::string node, std::optional<site_security> security = {});
     ~site();
 
     void connect();
@@ -89,6 +98,12 @@ class site final : public bridge_output {
     [[nodiscard]] bool subscribes(std::string_view subject, bool shared) const;
     [[nodiscard]] std::uint64_t connection() const noexcept { return connection_; }
     [[nodiscard]] bridge& core() noexcept { return *bridge_; }
+    /// A message as this site seals it. \pre it is of a secured fleet, and connected
+    [[nodiscard]] std::string seal(std::string_view subject, std::string_view reply, std::string_view message) {
+        return channel_->seal(subject, reply, message);
+    }
+    /// The rights have changed.
+    void change_security();
     /// The last line that answers the request.
     [[nodiscard]] std::string answer(std::uint64_t id) const;
 
@@ -106,6 +121,11 @@ class site final : public bridge_output {
     int pools_changed = 0;
     bool is_full = false; ///< only short messages can be published
 
+    // In a secured fleet.
+    std::set<std::string> distrusted;       ///< members that may not forward for this node
+    mutable std::vector<std::string> binds; ///< whose rights were checked: "gate hub car9:speed" of gate, from=hub
+    std::vector<std::string> rosters;       ///< versions that were stated: "<instance> 2"
+
   private:
     bool publish(std::string subject, std::string reply, std::string message, room in) override;
     void subscribe(std::string subject, bool shared) override;
@@ -118,6 +138,15 @@ class site final : public bridge_output {
     [[nodiscard]] std::vector<std::string> home_names() const override { return names; }
     void log(log_level level, const std::string& text) override;
 
+    [[nodiscard]] bool may_forward(std::string_view member) const override;
+    [[nodiscard]] std::string how_to_permit(std::string_view member) const override;
+    [[nodiscard]] std::optional<protocol::failure> refusal(std::string_view member,
+                                                           const protocol::request_line& bind) const override;
+    [[nodiscard]] std::uint32_t roster_version() const override { return security_->roster_version(); }
+    void on_lost(const bridge_id& gone) override { channel_->forget(gone); }
+    void on_stated_roster(const bridge_id& by, std::uint32_t version) override;
+
+    void open(const std::string& subject, const std::string& reply, const std::string& message);
     void serve(const bridge_link& on, const std::string& line);
     void reply(const bridge_link& on, std::uint64_t id, const std::string& rest);
     void tick();
@@ -125,6 +154,8 @@ class site final : public bridge_output {
     simulated_nats& nats_;
     std::string pool_;
     std::string node_;
+    std::optional<site_security> security_;
+    std::optional<sealed_channel> channel_; // in a secured fleet, while it is connected
     std::unique_ptr<bridge> bridge_;
     std::multimap<std::string, bool> subscriptions_; // whether they are shared
     std::uint64_t connection_ = 0;                   // 0: none

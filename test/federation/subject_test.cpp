@@ -35,7 +35,11 @@ BOOST_AUTO_TEST_CASE(dots_in_names_are_escaped) {
     BOOST_TEST(read.task == "a.b.c");
 }
 
-BOOST_AUTO_TEST_CASE(messages_for_a_bridge_are_replies_or_control) {
+BOOST_AUTO_TEST_CASE(messages_for_a_bridge_are_requests_replies_or_control) {
+    const auto request = parse_subject(request_subject(gate));
+    BOOST_TEST((request.kind == subject_kind::request));
+    BOOST_TEST((request.bridge() == gate));
+    BOOST_TEST(parse_subject("cles.north.pull.car1.speed").instance.empty());
     const auto reply = parse_subject(reply_subject(gate, 7));
     BOOST_TEST((reply.kind == subject_kind::reply));
     BOOST_TEST(reply.number == 7U);

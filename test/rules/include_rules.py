@@ -50,7 +50,7 @@ MAY_INCLUDE = {
     "protocol": {"json", "plain"},
     "port": {"protocol", "plain", "link"},
     "node": {"json", "protocol", "port", "below_facade"},
-    "federation": {"json", "protocol", "plain"},
+    "federation": {"json", "protocol", "port", "plain"},
     "nats": {"public", "protocol", "port", "node", "federation"},
     "security": {"json", "protocol", "port", "plain"},
     "tls": {"protocol", "security", "transport", "plain", "link"},

@@ -35,10 +35,12 @@ struct stated_bridge {
     std::string pool;
     bool connected = false;
     std::optional<std::string> problem;
+    std::optional<bool> member; // of a fleet that is secured
+    std::optional<std::vector<std::string>> not_permitted;
     std::vector<stated_pool> pools;
     std::optional<std::uint64_t> round_trip_us;
 };
-BOOST_DESCRIBE_STRUCT(stated_bridge, (), (pool, connected, problem, pools, round_trip_us))
+BOOST_DESCRIBE_STRUCT(stated_bridge, (), (pool, connected, problem, member, not_permitted, pools, round_trip_us))
 
 struct stated_metrics {
     std::optional<stated_bridge> federation; // only of bridges
@@ -52,6 +54,21 @@ void check_bridge(const std::string& node, const stated_bridge& bridge, findings
             "check that the server of federation.nats in its configuration runs and is reachable, and the files "
             "credentials, token and tls");
         return;
+    }
+    if (bridge.member == false) {
+        found.failure("federation", node + " is not in the roster of its fleet, so it can seal nothing for other pools",
+                      "add it with cles fleet add, and bring it the roster");
+        return;
+    }
+    for (const auto& member : bridge.not_permitted.value_or(std::vector<std::string>{})) {
+        std::string text = node;
+        text.append(" has dropped what ")
+            .append(member)
+            .append(" sent through NATS: it may not forward for ")
+            .append(node);
+        std::string advice = "add ";
+        advice.append(node).append(" to what ").append(member).append(" may forward for (cles fleet rights ");
+        found.warning("federation", text, advice.append(member).append(" --forwards LIST, or '*')"));
     }
     if (bridge.problem) {
         found.warning("federation", "NATS refuses a part of what " + node + " does: " + *bridge.problem,

@@ -38,7 +38,8 @@ struct federation_options {
 /// it: up to 200 ms for what is left to send, and while it connects, up to one second for each server, with TLS one
 /// more for each message of the handshake, and as long as the system takes to look up its name. The files are read at
 /// each connection. The service has to route (`cles::routing`) to serve requests of other pools for other nodes.
-/// It needs `service_options::insecure`: everybody who may publish to NATS can send requests.
+/// What crosses NATS is sealed if the service has `service_options::security`; without it, everybody who may publish
+/// to NATS can send requests, which `service_options::insecure` has to permit.
 ///
 /// \throws cles::error with `invalid_option` or `invalid_name`
 std::function<void(asio_port::asio_environment&, core::node_options&)> federation(federation_options options);

@@ -18,7 +18,9 @@ using std::chrono::milliseconds;
 constexpr milliseconds per_bridge{4};            // of the interval between heartbeats
 constexpr milliseconds names_again_after{1'000}; // if nobody has answered
 constexpr milliseconds between_names{200};
-constexpr milliseconds soon{20}; // heartbeats that others ask for
+constexpr milliseconds soon{20};          // until a heartbeat that others ask for
+constexpr milliseconds between_asked{50}; // of these, in a secured fleet
+constexpr milliseconds acquaintance{200}; // in which the bridges of a secured fleet get to know a new one
 constexpr std::chrono::seconds at_home_within{10};
 constexpr std::chrono::seconds optimistic{1}; // after connecting, a pool that is not known may still appear
 constexpr std::chrono::minutes between_drop_logs{1};
@@ -26,6 +28,8 @@ constexpr std::uint32_t upstream_keep = 1024;
 constexpr std::chrono::seconds remembered_for{10}; // after a bridge is lost, or before it is known
 constexpr std::size_t max_not_live = 1024;
 constexpr std::size_t max_short = 1024; // of a failure for which room is reserved
+// Of 2^32. Multiples of it are even, also if each second one is taken, as when requests of two kinds alternate.
+constexpr std::uint32_t golden_ratio = 0x9e3779b9U;
 
 constexpr std::array all_verbs{verb::pull, verb::push, verb::delegate, verb::bind, verb::update};
 constexpr std::string_view cancel_path = "cles/cancel/";
@@ -36,6 +40,11 @@ constexpr std::string_view names_line = "PULL self:cles/names";
 std::string_view without_pool(std::string_view target, std::string_view pool) {
     const bool has_it = target.size() > pool.size() + 1 && target.starts_with(pool) && target[pool.size()] == '.';
     return has_it ? target.substr(pool.size() + 1) : target;
+}
+
+bool acknowledges_for_another(std::string_view message, std::string_view sender) {
+    const auto taker = take_taker(message);
+    return !taker.empty() && taker != sender;
 }
 
 std::string noun_of(const protocol::request_line& r) {
@@ -54,12 +63,21 @@ void bridge::on_connected(std::uint64_t drawn, std::size_t max_message, time_poi
     constexpr std::size_t around = 256; // the part of a line that is not in the message
     max_message_ = std::min(max_message, setup_.max_line - std::min(around, setup_.max_line));
     replaced_ = std::exchange(self_.instance, instance_text(drawn));
+    if (trust_ != nullptr && !are_of_one_member(replaced_, self_.instance)) {
+        replaced_.clear(); // nobody may replace a bridge of another member: that one is lost when it stays silent
+    }
     self_.pool = setup_.pool;
     ++figures_.connections;
     out_.subscribe(inbox_filter(self_), false);
     out_.subscribe(std::string{heartbeat_filter}, false);
     out_.subscribe(std::string{names_filter}, false);
-    if (!leaving_) {
+    starting_until_.reset();
+    reachable_from_.reset();
+    untrusted_.clear();
+    if (trust_ != nullptr) {
+        starting_until_ = now + acquaintance;
+        reachable_from_ = now + acquaintance + soon; // the heartbeat arrives before the first request
+    } else if (!leaving_) {
         for (const auto how : all_verbs) {
             out_.subscribe(request_filter(setup_.pool, how), true);
         }
@@ -68,7 +86,7 @@ void bridge::on_connected(std::uint64_t drawn, std::size_t max_message, time_poi
     round_trip_.reset();
     pools_.note_connection(now);
     send_heartbeat(true);
-    due_ = next_heartbeat_;
+    set_due();
 }
 
 void bridge::on_disconnected(std::string_view why) {
@@ -89,11 +107,17 @@ void bridge::on_disconnected(std::string_view why) {
     out_.on_pools_changed();
 }
 
-void bridge::leave() {
-    if (!std::exchange(leaving_, true) && connected_) {
-        for (const auto how : all_verbs) {
-            out_.unsubscribe(request_filter(setup_.pool, how));
-        }
+void bridge::leave(time_point now) {
+    now_ = now;
+    if (std::exchange(leaving_, true) || !connected_) {
+        return;
+    }
+    if (trust_ != nullptr) {
+        send_heartbeat(false);
+        return;
+    }
+    for (const auto how : all_verbs) {
+        out_.unsubscribe(request_filter(setup_.pool, how));
     }
 }
 
@@ -122,6 +146,14 @@ void bridge::on_time(time_point now) {
     if (names_wanted_ && next_names_ <= now) {
         send_names();
     }
+    if (starting_until_ && *starting_until_ <= now) {
+        starting_until_.reset();
+        next_heartbeat_ = now;
+    }
+    if (reachable_from_ && *reachable_from_ <= now) {
+        reachable_from_.reset();
+        out_.on_pools_changed();
+    }
     if (next_heartbeat_ <= now) {
         send_heartbeat(false);
     }
@@ -140,7 +172,12 @@ void bridge::on_time(time_point now) {
     });
     sent_.on_time(now);
     check_own_pool(now);
+    set_due();
+}
+
+void bridge::set_due() {
     due_ = names_wanted_ ? std::min(next_heartbeat_, next_names_) : next_heartbeat_;
+    due_ = std::min({due_, starting_until_.value_or(time_point::max()), reachable_from_.value_or(time_point::max())});
 }
 
 milliseconds bridge::interval() const {
@@ -149,12 +186,19 @@ milliseconds bridge::interval() const {
 
 // -- messages ------------------------------------------------------------------------------------------------------
 
-void bridge::on_message(std::string_view where, std::string_view reply, std::string_view message, time_point now) {
+void bridge::on_message(std::string_view where, std::string_view reply, std::string_view message, time_point now,
+                        const message_sender& by) {
     now_ = now;
     if (!connected_) {
         return;
     }
-    const auto about = parse_subject(where);
+    auto about = parse_subject(where);
+    if (trust_ != nullptr && about.kind != subject_kind::heartbeat && !has_effect(where, about, by)) {
+        return;
+    }
+    if (trust_ == nullptr && about.kind == subject_kind::request && !about.instance.empty()) {
+        about.kind = subject_kind::foreign; // permissions of NATS are about subjects that state verb, node and task
+    }
     if (message.size() > max_message_) { // its line could not be read
         drop(where, "it is too long");
         if (about.kind == subject_kind::request) {
@@ -182,17 +226,107 @@ void bridge::on_message(std::string_view where, std::string_view reply, std::str
         return;
     }
     switch (about.kind) {
-    case subject_kind::request: take(about, reply, message, false); break;
+    case subject_kind::request:
+        if (about.instance.empty()) {
+            take(where, text_of(about.verb, about.node, about.task, message), reply, by.member, false);
+        } else {
+            take(where, message, reply, by.member, false);
+        }
+        break;
     case subject_kind::feed:
         ++figures_.updates_received;
         deliver(feeds_.on_update(about, message));
         break;
-    case subject_kind::heartbeat: on_heartbeat(about, message, now); break;
+    case subject_kind::heartbeat: on_heartbeat(about, message, now, by); break;
     case subject_kind::names: on_names(about, message); break;
-    case subject_kind::control: on_control(reply, message, now); break;
-    case subject_kind::reply: sent_.on_message(about.number, message, now); break;
+    case subject_kind::control: on_control(reply, message, now, by); break;
+    case subject_kind::reply:
+        if (trust_ != nullptr && acknowledges_for_another(message, by.instance)) {
+            drop(where, "it acknowledges a request for another bridge");
+        } else {
+            sent_.on_message(about.number, message, now);
+        }
+        break;
+    case subject_kind::question: // of seals; without security, nobody asks
     case subject_kind::foreign: drop(where, "it is not a subject of CLES"); break;
     }
+}
+
+// Whether a message that was opened has an effect. A server could deliver a request to a second bridge, where it would
+// run again. Requests and control lines are answered if their sender is not known.
+bool bridge::has_effect(std::string_view where, const subject& about, const message_sender& by) {
+    const bool is_for_all = about.kind == subject_kind::feed || about.kind == subject_kind::names;
+    if (!is_for_all && about.bridge() != self_) {
+        drop(where, "it is not for this bridge");
+        return false;
+    }
+    if (about.kind == subject_kind::request || about.kind == subject_kind::control || by.instance == self_.instance) {
+        return true;
+    }
+    if (!trust_->may_forward(by.member)) {
+        drop_untrusted(by);
+        return false;
+    }
+    if (about.kind == subject_kind::feed && !pools_.is_live({about.pool, std::string{by.instance}})) {
+        drop(where, "its sender is no bridge that is known here");
+        return false;
+    }
+    return true;
+}
+
+void bridge::drop_untrusted(const message_sender& by) {
+    ++figures_.messages_refused;
+    if (untrusted_.emplace(by.member).second) {
+        out_.log(log_level::warning, "dropped what '" + std::string{by.member} +
+                                         "' has sent through NATS: it may not forward for this node " +
+                                         trust_->how_to_permit(by.member));
+    }
+}
+
+void bridge::on_refused(std::string_view where, std::string_view why, time_point now) {
+    now_ = now;
+    drop(where, why);
+}
+
+void bridge::on_unproven(std::string_view where, std::string_view reply, time_point now) {
+    now_ = now;
+    const auto about = parse_subject(where);
+    if (connected_ && about.kind == subject_kind::request && about.bridge() == self_) {
+        refuse_foreign(std::string{reply},
+                       {.code = errc::busy,
+                        .message = "the bridge '" + setup_.node + "' does not know the one that asks yet",
+                        .retry_ms = protocol::default_retry_ms});
+    }
+}
+
+void bridge::announce_soon(time_point now) {
+    if (!connected_) {
+        return;
+    }
+    next_heartbeat_ = std::min(next_heartbeat_, std::max(now + soon, last_heartbeat_ + between_asked));
+    due_ = std::min(due_, next_heartbeat_);
+}
+
+void bridge::on_security_changed(time_point now) {
+    now_ = now;
+    if (!connected_ || trust_ == nullptr) {
+        return;
+    }
+    untrusted_.clear();
+    std::vector<bridge_id> gone;
+    for (const auto& [name, p] : pools_.pools()) {
+        for (const auto& [instance, b] : p.bridges) {
+            if (instance != self_.instance && !trust_->may_forward(b.node)) {
+                gone.push_back({name, instance});
+            }
+        }
+    }
+    for (const auto& each : gone) {
+        if (pools_.lose(each, now)) {
+            on_lost(each, "the bridge of the pool '" + each.pool + "' may not forward for this node any more");
+        }
+    }
+    announce_soon(now); // with the version of the roster
 }
 
 void bridge::drop(std::string_view where, std::string_view why) {
@@ -213,15 +347,17 @@ void bridge::send_heartbeat(bool starting) {
                          .names = home_.digest,
                          .replaces = replaced_,
                          .leaving = left_,
-                         .starting = starting};
-    if (!left_) {
+                         .starting = starting || starting_until_,
+                         .closing = trust_ != nullptr && leaving_,
+                         .roster = trust_ != nullptr ? trust_->roster_version() : 0};
+    if (!left_ && !starting_until_) {
         pools_.on_heartbeat(self_, said, now_); // so that `publisher_of` considers it
     }
-    heartbeat_sent_ = now_;
+    heartbeat_sent_ = last_heartbeat_ = now_;
     publish_short(heartbeat_subject(self_), text_of(said));
 }
 
-void bridge::on_heartbeat(const subject& from, std::string_view message, time_point now) {
+void bridge::on_heartbeat(const subject& from, std::string_view message, time_point now, const message_sender& by) {
     const auto id = from.bridge();
     if (id == self_) {
         if (const auto sent = std::exchange(heartbeat_sent_, {})) {
@@ -234,16 +370,36 @@ void bridge::on_heartbeat(const subject& from, std::string_view message, time_po
         drop(heartbeat_subject(id), "it is not a heartbeat");
         return;
     }
+    if (trust_ != nullptr) {
+        if (said->node != by.member || id.instance != by.instance ||
+            (!said->replaces.empty() && !are_of_one_member(said->replaces, by.instance))) {
+            drop(heartbeat_subject(id), "it is a heartbeat for another bridge");
+            return;
+        }
+        trust_->on_stated_roster(id, said->roster); // which may permit this bridge
+        if (!trust_->may_forward(by.member)) {
+            drop_untrusted(by);
+            return;
+        }
+    }
     if (!said->replaces.empty()) {
         const bridge_id before{id.pool, said->replaces};
         if (pools_.remove(before, now)) {
             on_lost(before, "the bridge of the pool '" + id.pool + "' has connected to NATS again");
+        } else if (trust_ != nullptr) {
+            trust_->on_lost(before);
         }
     }
     if (said->leaving) {
         if (pools_.remove(id, now)) {
             on_lost(id, "the bridge of the pool '" + id.pool + "' has left");
+        } else if (trust_ != nullptr) {
+            trust_->on_lost(id);
         }
+        return;
+    }
+    if (trust_ != nullptr && said->starting) { // it takes no requests yet, but wants to know this bridge
+        announce_soon(now);
         return;
     }
     switch (pools_.on_heartbeat(id, *said, now)) {
@@ -295,7 +451,8 @@ void bridge::send_control(const bridge_id& to, std::string line) {
     out_.publish(control_subject(to), control_subject(self_), std::move(line), bridge_output::room::reserved);
 }
 
-void bridge::on_control(std::string_view reply, std::string_view message, time_point now) {
+void bridge::on_control(std::string_view reply, std::string_view message, time_point now,
+                        const message_sender& sender) {
     const auto from = parse_subject(reply);
     const auto by = from.bridge();
     protocol::request_line r;
@@ -305,17 +462,19 @@ void bridge::on_control(std::string_view reply, std::string_view message, time_p
         drop(control_subject(self_), "it is not a message of a bridge");
         return;
     }
+    // A bridge of the own pool passes on the BIND of another one.
+    const bool is_passed_on = r.verb == verb::bind && !r.unbinds();
+    if (trust_ != nullptr && by.instance != sender.instance &&
+        !(is_passed_on && pools_.is_live(bridge_id{setup_.pool, std::string{sender.instance}}))) {
+        drop(control_subject(self_), "it is for another bridge than its sender");
+        return;
+    }
     if (r.verb == verb::bind && r.unbinds()) {
         if (const auto noun = noun_of(r); published_.unbind(noun, by)) {
             end_published(noun);
         }
     } else if (r.verb == verb::bind) {
-        take({.kind = subject_kind::request,
-              .pool = setup_.pool,
-              .verb = verb::bind,
-              .node = std::string{r.noun.target},
-              .task = std::string{r.noun.task}},
-             reply, message_of(r, {}), true);
+        take(control_subject(self_), message, reply, sender.member, true);
     } else if (message == names_line) {
         names_wanted_ = true;
         next_names_ = std::max(next_names_, now);
@@ -338,6 +497,9 @@ void bridge::on_control(std::string_view reply, std::string_view message, time_p
 
 void bridge::on_lost(const bridge_id& gone, std::string_view why) {
     ++figures_.bridges_lost;
+    if (trust_ != nullptr) {
+        trust_->on_lost(gone);
+    }
     asked_names_.erase(gone);
     for (const auto id : taken_.requests_of(gone)) {
         cancel_taken(id);
@@ -424,7 +586,7 @@ void bridge::on_closed(const bridge_link& which) {
         });
         break;
     case bridge_link::role::from_pool:
-        for (const auto id : taken_.requests_of(which.pool)) {
+        for (const auto id : taken_.requests_of(which.pool, which.member)) {
             const auto reply = taken_.find(id)->reply;
             taken_.remove(id);
             refuse_foreign(reply, {.code = errc::unavailable, .message = setup_.node + " has closed the link"});
@@ -492,7 +654,9 @@ void bridge::send_request(const bridge_link& from, std::string_view line, time_p
 
 void bridge::publish_request(const bridge_link& from, const protocol::request_line& r, time_point now) {
     const auto& pool = from.pool;
-    const auto number = sent_.add(from, r.id, now + milliseconds{r.deadline_ms}, now);
+    const std::string addressee{trust_ != nullptr ? pools_.taker_of(pool, turn_) : std::string_view{}};
+    turn_ += golden_ratio;
+    const auto number = sent_.add(from, r.id, now + milliseconds{r.deadline_ms}, now, addressee);
     if (has_crossed(r.via)) { // a node of that name in another pool is not the one that was meant
         sent_.refuse(number, {.code = errc::no_target,
                               .message = "a request from another pool is not sent on to '" + pool + "'"});
@@ -501,6 +665,16 @@ void bridge::publish_request(const bridge_link& from, const protocol::request_li
     const auto node = without_pool(r.noun.target, pool);
     const auto deadline = node == "all" ? sent_.deadline_of_all(pool, r.deadline_ms) : 0;
     auto message = pool == setup_.pool ? message_within_pool(r, deadline) : message_of(r, setup_.pool, deadline);
+    auto subject = request_subject(pool, r.verb, node, r.noun.task);
+    if (trust_ != nullptr) { // for one bridge, so that the request runs there only, however often it arrives
+        if (addressee.empty()) {
+            sent_.refuse(number, {.code = errc::unavailable,
+                                  .message = "no bridge of the pool '" + pool + "' takes requests now"});
+            return;
+        }
+        subject = request_subject({pool, addressee});
+        message = text_of(r.verb, node, r.noun.task, message);
+    }
     if (message.size() > max_message_) {
         sent_.refuse(number,
                      {.code = errc::too_large,
@@ -508,8 +682,8 @@ void bridge::publish_request(const bridge_link& from, const protocol::request_li
         return;
     }
     ++figures_.requests_sent;
-    if (!out_.publish(request_subject(pool, r.verb, node, r.noun.task), reply_subject(self_, number),
-                      std::move(message), bridge_output::room::shared)) {
+    if (!out_.publish(std::move(subject), reply_subject(self_, number), std::move(message),
+                      bridge_output::room::shared)) {
         sent_.refuse(number, {.code = errc::busy,
                               .message = "too much waits to be sent to NATS",
                               .retry_ms = protocol::default_retry_ms});
@@ -608,16 +782,16 @@ void bridge::refuse_foreign(const std::string& reply, const protocol::failure& w
     }
 }
 
-void bridge::take(const subject& about, std::string_view reply, std::string_view message, bool is_passed_on) {
+void bridge::take(std::string_view where, std::string_view line, std::string_view reply, std::string_view member,
+                  bool is_passed_on) {
     const std::string answer_at{reply};
-    const auto text = text_of(about.verb, about.node, about.task, message);
     protocol::request_line r;
     protocol::malformed_request wrong;
-    if (protocol::parse_request(text, r, wrong) && r.is_update()) {
+    if (protocol::parse_request(line, r, wrong) && r.is_update()) {
         wrong.why = "an update with 'seq' and 'epoch' is not a request";
     }
     if (!wrong.why.empty()) {
-        drop(request_subject(about.pool, about.verb, about.node, about.task), wrong.why);
+        drop(where, wrong.why);
         refuse_foreign(answer_at, {.code = errc::bad_request, .message = wrong.why});
         return;
     }
@@ -627,10 +801,18 @@ void bridge::take(const subject& about, std::string_view reply, std::string_view
         return;
     }
     const auto from = parse_subject(reply);
-    taken_requests::request by{.by = {}, .number = 0, .reply = answer_at};
+    taken_requests::request by{.by = {}, .number = 0, .reply = answer_at, .member = std::string{member}};
     if (from.kind == subject_kind::reply) {
         by.by = from.bridge();
         by.number = from.number;
+    }
+    if (trust_ != nullptr && by.by.pool.empty()) { // nobody would notice its loss, or that it arrives again
+        drop(where, "only bridges send sealed requests");
+        return;
+    }
+    if (const auto why = trust_ != nullptr ? why_not_served(by, is_passed_on) : std::nullopt) {
+        refuse_foreign(answer_at, *why);
+        return;
     }
     if (by.by.pool != setup_.pool && has_passed(r.via, setup_.pool)) {
         refuse_foreign(answer_at, {.code = errc::no_target,
@@ -645,7 +827,7 @@ void bridge::take(const subject& about, std::string_view reply, std::string_view
     if (!r.wants_reply || answer_at.empty()) {
         by.reply.clear();
     }
-    const bridge_link on{bridge_link::role::from_pool, by.by.pool};
+    const bridge_link on{.what = bridge_link::role::from_pool, .pool = by.by.pool, .member = by.member};
     if (!by.by.pool.empty() && !remember(by.by)) {
         refuse_foreign(answer_at, {.code = errc::busy,
                                    .message = "too many bridges that are not known here ask",
@@ -662,6 +844,26 @@ void bridge::take(const subject& about, std::string_view reply, std::string_view
     if (!r.wants_reply) {
         taken_.remove(*id);
     }
+}
+
+// Why a request of that bridge of a secured fleet is refused. What a bridge asks that is not known, or lost, may have
+// been held back for long.
+std::optional<protocol::failure> bridge::why_not_served(const taken_requests::request& by, bool is_passed_on) const {
+    if (leaving_) {
+        return protocol::failure{
+            .code = errc::busy, .message = setup_.node + " is shutting down", .retry_ms = protocol::default_retry_ms};
+    }
+    if (pools_.is_live(by.by)) {
+        return {};
+    }
+    if (!is_passed_on && !trust_->may_forward(by.member)) {
+        return protocol::failure{.code = errc::denied,
+                                 .message = "'" + by.member + "' may not forward for '" + setup_.node + "' " +
+                                            trust_->how_to_permit(by.member)};
+    }
+    return protocol::failure{.code = errc::busy,
+                             .message = "the bridge '" + setup_.node + "' does not know the one that asks yet",
+                             .retry_ms = protocol::default_retry_ms};
 }
 
 // Whether its requests can be recognised if they arrive again. It may not be known yet.
@@ -686,7 +888,7 @@ void bridge::on_batch() {
 
 void bridge::cancel_taken(std::uint64_t id) {
     if (const auto* r = taken_.find(id)) {
-        out_.deliver({bridge_link::role::from_pool, r->by.pool},
+        out_.deliver({.what = bridge_link::role::from_pool, .pool = r->by.pool, .member = r->member},
                      "PUSH self:" + std::string{cancel_path} + std::to_string(id) + " reply=no");
     }
 }
@@ -732,11 +934,21 @@ void bridge::take_bind(const protocol::request_line& r, const taken_requests::re
                                   .retry_ms = static_cast<std::uint64_t>(setup_.interval.count())});
         return;
     }
+    if (trust_ != nullptr) {
+        if (const auto why = trust_->refusal(by.member, r)) {
+            refuse_foreign(by.reply, *why);
+            return;
+        }
+    }
     const auto noun = noun_of(r);
     const auto publisher = pools_.publisher_of(setup_.pool, noun);
     if (!is_passed_on && publisher != self_.instance && !publisher.empty()) {
+        auto message = message_of(r, {});
+        if (trust_ != nullptr && r.from.empty()) { // that one knows this bridge only
+            message.insert(r.noun.path.size() - r.noun.task.size(), " from=" + by.member);
+        }
         out_.publish(control_subject({setup_.pool, std::string{publisher}}), by.reply,
-                     text_of(verb::bind, r.noun.target, r.noun.task, message_of(r, {})), bridge_output::room::reserved);
+                     text_of(verb::bind, r.noun.target, r.noun.task, message), bridge_output::room::reserved);
         return;
     }
     ++figures_.requests_taken;

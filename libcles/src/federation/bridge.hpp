@@ -62,6 +62,36 @@ class bridge_output {
     ~bridge_output() = default;
 };
 
+/// What the bridge of a secured fleet asks about members. None of it calls the bridge.
+class bridge_trust {
+  public:
+    bridge_trust() = default;
+    bridge_trust(const bridge_trust&) = delete;
+    bridge_trust& operator=(const bridge_trust&) = delete;
+
+    /// Whether that member may forward for this node: others are no bridges to it.
+    [[nodiscard]] virtual bool may_forward(std::string_view member) const = 0;
+    /// How to permit it, for people.
+    [[nodiscard]] virtual std::string how_to_permit(std::string_view member) const = 0;
+    /// Why a BIND that this member has sent is refused. Nothing: it is permitted.
+    [[nodiscard]] virtual std::optional<protocol::failure> refusal(std::string_view member,
+                                                                   const protocol::request_line& bind) const = 0;
+    [[nodiscard]] virtual std::uint32_t roster_version() const = 0;
+    /// That bridge is lost. What it has sent before does not count any more.
+    virtual void on_lost(const bridge_id& gone) = 0;
+    /// A bridge has stated the version of its roster.
+    virtual void on_stated_roster(const bridge_id& by, std::uint32_t version) = 0;
+
+  protected:
+    ~bridge_trust() = default;
+};
+
+/// The bridge that has sealed a message; empty in a fleet without security.
+struct message_sender {
+    std::string_view member{};
+    std::string_view instance{};
+};
+
 /// Joins a pool to others through NATS: passes requests of the node to other pools, and theirs to the node
 /// (docs/federation.md). It does no input or output; time is a parameter.
 ///
@@ -86,19 +116,30 @@ class bridge final : private sent_requests_events {
         std::uint64_t connections = 0;
     };
 
-    bridge(settings setup, bridge_output& out) : setup_(std::move(setup)), out_(out), sent_(*this) {}
+    /// \param trust in a secured fleet; else null
+    bridge(settings setup, bridge_output& out, bridge_trust* trust = nullptr)
+        : setup_(std::move(setup)), out_(out), trust_(trust), sent_(*this) {}
 
-    /// Connected to NATS, and not subscribed to anything. \param drawn at random \param max_message in bytes
+    /// Connected to NATS, and not subscribed to anything. \param drawn for the instance \param max_message in bytes
     void on_connected(std::uint64_t drawn, std::size_t max_message, time_point now);
     void on_disconnected(std::string_view why);
-    void on_message(std::string_view where, std::string_view reply, std::string_view message, time_point now);
+    void on_message(std::string_view where, std::string_view reply, std::string_view message, time_point now,
+                    const message_sender& by = {});
+    /// A sealed message could not be opened.
+    void on_refused(std::string_view where, std::string_view why, time_point now);
+    /// A message whose sender may not be alive any more. If it is a request, that is told.
+    void on_unproven(std::string_view where, std::string_view reply, time_point now);
+    /// Another bridge does not know this one yet.
+    void announce_soon(time_point now);
+    /// The roster or the rights have changed.
+    void on_security_changed(time_point now);
     /// The messages of one read have been passed, and the node has replied to those that it answers at once.
     void on_batch();
     /// To be called at `due`, and when the node's pool has changed.
     void on_time(time_point now);
     [[nodiscard]] time_point due() const noexcept { return due_; }
     /// Takes no more requests. Those in flight continue.
-    void leave();
+    void leave(time_point now);
     /// The node has closed all links: tells the others that this bridge is gone.
     void say_left();
 
@@ -111,10 +152,14 @@ class bridge final : private sent_requests_events {
     /// known.
     [[nodiscard]] std::string pool_of(std::string_view target, time_point now) const;
     /// Whether requests can be sent to that pool now.
-    [[nodiscard]] bool is_live(std::string_view pool) const { return connected_ && pools_.is_live(pool); }
+    [[nodiscard]] bool is_live(std::string_view pool) const {
+        return connected_ && !reachable_from_ && pools_.is_live(pool);
+    }
     [[nodiscard]] bool is_connected() const noexcept { return connected_; }
     [[nodiscard]] const pool_table& pools() const noexcept { return pools_; }
     [[nodiscard]] const figures& counted() const noexcept { return figures_; }
+    /// Members that have sent something, and may not forward for this node.
+    [[nodiscard]] const std::set<std::string, std::less<>>& not_permitted() const noexcept { return untrusted_; }
     /// How long the last own heartbeat took to the server and back. Nothing if none has come back since the connection
     /// was made: it may not be permitted to publish or receive heartbeats.
     [[nodiscard]] std::optional<time_point::duration> round_trip() const noexcept { return round_trip_; }
@@ -134,7 +179,8 @@ class bridge final : private sent_requests_events {
     void unsubscribe_if_last(const foreign_feeds::removed& gone);
 
     // Requests of other pools.
-    void take(const subject& about, std::string_view reply, std::string_view message, bool is_passed_on);
+    void take(std::string_view where, std::string_view line, std::string_view reply, std::string_view member,
+              bool is_passed_on);
     void take_bind(const protocol::request_line& r, const taken_requests::request& by, bool is_passed_on);
     void send_reply(std::string_view line);
     void send_bind_reply(std::string_view line);
@@ -146,13 +192,18 @@ class bridge final : private sent_requests_events {
     void refuse_foreign(const std::string& reply, const protocol::failure& why);
     void drop(std::string_view where, std::string_view why);
     bool remember(const bridge_id& by);
+    [[nodiscard]] std::optional<protocol::failure> why_not_served(const taken_requests::request& by,
+                                                                  bool is_passed_on) const;
 
     // Other bridges.
-    void on_heartbeat(const subject& from, std::string_view message, time_point now);
+    void on_heartbeat(const subject& from, std::string_view message, time_point now, const message_sender& by);
     void on_names(const subject& from, std::string_view message);
-    void on_control(std::string_view reply, std::string_view message, time_point now);
+    void on_control(std::string_view reply, std::string_view message, time_point now, const message_sender& sender);
+    [[nodiscard]] bool has_effect(std::string_view where, const subject& about, const message_sender& by);
+    void drop_untrusted(const message_sender& by);
     void on_lost(const bridge_id& gone, std::string_view why);
     void send_heartbeat(bool starting);
+    void set_due();
     void send_names();
     void send_control(const bridge_id& to, std::string line);
     void check_own_pool(time_point now);
@@ -165,17 +216,21 @@ class bridge final : private sent_requests_events {
 
     const settings setup_;
     bridge_output& out_;
+    bridge_trust* trust_; // null: the fleet is not secured
     bridge_id self_{};
     std::string replaced_; // the instance before
     std::size_t max_message_ = 0;
     bool connected_ = false;
-    bool leaving_ = false; // takes no more requests
+    bool leaving_ = false;                     // takes no more requests
+    std::optional<time_point> starting_until_; // in a secured fleet: others get to know this bridge
+    std::optional<time_point> reachable_from_; // other pools, which know it then
     bool left_ = false;
     time_point connected_at_{};
     bool pools_may_appear_ = false; // names with their prefix are taken for theirs
     time_point now_{};
     time_point due_{time_point::max()};
     time_point next_heartbeat_{};
+    time_point last_heartbeat_{};
     std::optional<time_point> heartbeat_sent_; // nothing: it has come back
     std::optional<time_point::duration> round_trip_;
     time_point next_names_{};
@@ -184,13 +239,15 @@ class bridge final : private sent_requests_events {
     node_names home_;
     pool_table pools_;
     sent_requests sent_;
+    std::uint32_t turn_ = 0; // of the bridges of a pool that take requests
     taken_requests taken_;
     std::map<bridge_id, time_point> not_live_; // that have asked and are not live, and when they are forgotten
     foreign_feeds feeds_;
     std::map<std::uint64_t, foreign_noun> binds_; // that are not answered, by the node's id
     published_nouns published_;
-    std::map<bridge_id, time_point> asked_names_; // and when
-    std::set<std::string> warned_of_;             // bridges of the own pool that are not at home, and were logged
+    std::map<bridge_id, time_point> asked_names_;  // and when
+    std::set<std::string> warned_of_;              // bridges of the own pool that are not at home, and were logged
+    std::set<std::string, std::less<>> untrusted_; // members that may not forward, and were logged
     figures figures_;
 };
 

@@ -17,6 +17,7 @@ struct bridge_link {
     role what = role::to_pool;
     std::string pool{};
     std::uint32_t number = 0; ///< of links that the node opens, since it may need several to one pool
+    std::string member{};     ///< in a secured fleet, the bridge from which requests come: each has a link of its own
 
     auto operator<=>(const bridge_link&) const = default; // NOLINT(modernize-use-nullptr): not about pointers
 };

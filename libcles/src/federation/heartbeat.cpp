@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <limits>
 
 namespace cles::bridging {
 namespace {
@@ -42,11 +43,16 @@ std::string text_of(const heartbeat& said) {
         w.key("replaces");
         w.value(std::string_view{said.replaces});
     }
-    for (const auto& [key, is_set] : {std::pair{"leaving", said.leaving}, std::pair{"starting", said.starting}}) {
+    for (const auto& [key, is_set] : {std::pair{"leaving", said.leaving}, std::pair{"starting", said.starting},
+                                      std::pair{"closing", said.closing}}) {
         if (is_set) {
             w.key(key);
             w.value(true);
         }
+    }
+    if (said.roster != 0) {
+        w.key("roster");
+        w.value(std::uint64_t{said.roster});
     }
     w.end_object();
     return text;
@@ -57,6 +63,7 @@ std::optional<heartbeat> parse_heartbeat(std::string_view text) {
     json_reader r{text, max_depth};
     std::string_view key;
     std::uint64_t interval = 0;
+    std::uint64_t roster = 0;
     bool good = r.begin_object();
     while (good && r.next_key(key)) {
         good = key == "node"          ? r.read(read.node)
@@ -65,12 +72,15 @@ std::optional<heartbeat> parse_heartbeat(std::string_view text) {
                : key == "replaces"    ? r.read(read.replaces)
                : key == "leaving"     ? r.read(read.leaving)
                : key == "starting"    ? r.read(read.starting)
+               : key == "closing"     ? r.read(read.closing)
+               : key == "roster"      ? r.read(roster)
                                       : r.skip();
     }
     if (!r.at_end() || !protocol::is_name(read.node) || !is_instance(read.names) ||
-        !(read.replaces.empty() || is_instance(read.replaces))) {
+        !(read.replaces.empty() || is_instance(read.replaces)) || roster > std::numeric_limits<std::uint32_t>::max()) {
         return {};
     }
+    read.roster = static_cast<std::uint32_t>(roster);
     read.interval = std::chrono::milliseconds{std::clamp(interval, min_interval, max_interval)};
     return read;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,7 +17,9 @@ struct heartbeat {
     std::string names{};    ///< a digest of the names of its pool's nodes
     std::string replaces{}; ///< the instance that it was before it connected again; empty: none
     bool leaving = false;
-    bool starting = false; ///< it knows nobody yet: others send theirs soon
+    bool starting = false;    ///< it knows nobody yet: others send theirs soon
+    bool closing = false;     ///< it takes no more requests, and leaves when it has answered those that it has
+    std::uint32_t roster = 0; ///< the version of its roster; 0: it has none
 
     bool operator==(const heartbeat&) const = default;
 };

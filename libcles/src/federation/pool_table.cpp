@@ -4,6 +4,7 @@
 #include "protocol/fnv1a.hpp"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 namespace cles::bridging {
@@ -53,7 +54,12 @@ pool_table::arrival pool_table::on_heartbeat(const bridge_id& from, const heartb
     const auto since = fresh ? now : entry.since;
     const bool knows = found->second.names.contains(said.names);
     auto names = knows ? said.names : entry.names;
-    entry = {.node = said.node, .interval = said.interval, .names = std::move(names), .heard = now, .since = since};
+    entry = {.node = said.node,
+             .interval = said.interval,
+             .names = std::move(names),
+             .heard = now,
+             .since = since,
+             .is_closing = said.closing};
     drop_unstated(found->second);
     if (!fresh) {
         return arrival::known;
@@ -85,6 +91,17 @@ bool pool_table::remove(const bridge_id& gone, time_point now) {
     return true;
 }
 
+bool pool_table::lose(const bridge_id& which, time_point now) {
+    if (!remove(which, now)) {
+        return false;
+    }
+    if (lost_.size() >= max_bridges) { // the other is then not told
+        lost_.clear();
+    }
+    lost_.insert(which);
+    return true;
+}
+
 std::vector<bridge_id> pool_table::expire(time_point now) {
     std::vector<bridge_id> gone;
     for (const auto& [name, p] : pools_) {
@@ -95,11 +112,7 @@ std::vector<bridge_id> pool_table::expire(time_point now) {
         }
     }
     for (const auto& each : gone) {
-        remove(each, now);
-        if (lost_.size() >= max_bridges) { // the other is then not told
-            lost_.clear();
-        }
-        lost_.insert(each);
+        lose(each, now);
     }
     return gone;
 }
@@ -202,13 +215,25 @@ std::string_view pool_table::pool_of(std::string_view node, std::string_view exc
 
 std::string_view pool_table::publisher_of(std::string_view of, std::string_view noun) const {
     const auto found = pools_.find(of);
-    std::pair<std::uint64_t, std::string_view> best;
+    std::tuple<bool, std::uint64_t, std::string_view> best;
     if (found != pools_.end()) {
         for (const auto& [instance, b] : found->second.bridges) {
-            best = std::max(best, {hash_of(instance, noun), std::string_view{instance}});
+            best = std::max(best, {!b.is_closing, hash_of(instance, noun), std::string_view{instance}});
         }
     }
-    return best.second;
+    return std::get<std::string_view>(best);
+}
+
+std::string_view pool_table::taker_of(std::string_view of, std::uint32_t turn) const {
+    std::vector<std::string_view> takers;
+    if (const auto found = pools_.find(of); found != pools_.end()) {
+        for (const auto& [instance, b] : found->second.bridges) {
+            if (!b.is_closing) {
+                takers.push_back(instance);
+            }
+        }
+    }
+    return takers.empty() ? std::string_view{} : takers[std::uint64_t{turn} * takers.size() >> 32U];
 }
 
 } // namespace cles::bridging

@@ -32,6 +32,7 @@ class pool_table {
         std::string names; ///< the digest of those that it has stated last, and that are known
         time_point heard;
         time_point since; ///< when it was first received
+        bool is_closing = false;
     };
     struct pool {
         std::map<std::string, bridge, std::less<>> bridges; ///< that are live, by instance
@@ -51,7 +52,10 @@ class pool_table {
     arrival on_heartbeat(const bridge_id& from, const heartbeat& said, time_point now);
     /// Removes a bridge. Returns false if it is not known.
     bool remove(const bridge_id& gone, time_point now);
-    /// Removes those that were silent for too long, and returns them.
+    /// The same for one that does not know that it is lost: if it returns, it is told. Returns false if it is not
+    /// known.
+    bool lose(const bridge_id& which, time_point now);
+    /// Loses those that were silent for too long, and returns them.
     std::vector<bridge_id> expire(time_point now);
     /// Nothing could be received for a while: silence counts from now on.
     void note_suspension(time_point now);
@@ -75,16 +79,18 @@ class pool_table {
     [[nodiscard]] std::size_t bridge_count() const noexcept { return bridge_count_; }
     /// The pool that has a node of this name, apart from `except`; live ones first. Empty if there is none.
     [[nodiscard]] std::string_view pool_of(std::string_view node, std::string_view except) const;
-    /// The bridge of the pool that publishes this noun for other pools. All who know the same bridges select the same
-    /// one. Empty if there is none.
+    /// The bridge of the pool that publishes this noun for other pools, one that is not closing if there is any. All
+    /// who know the same bridges select the same one. Empty if there is none.
     [[nodiscard]] std::string_view publisher_of(std::string_view of, std::string_view noun) const;
+    /// A bridge of the pool that takes requests, by `turn`, whose values are shared out evenly. Empty if there is none.
+    [[nodiscard]] std::string_view taker_of(std::string_view of, std::uint32_t turn) const;
     [[nodiscard]] const std::map<std::string, pool, std::less<>>& pools() const noexcept { return pools_; }
 
   private:
     bool make_room();
 
     std::map<std::string, pool, std::less<>> pools_;
-    std::set<bridge_id> lost_; ///< for lack of heartbeats
+    std::set<bridge_id> lost_; ///< that may not know it
     std::size_t bridge_count_ = 0;
 };
 

@@ -27,9 +27,14 @@ std::string_view take_taker(std::string_view& message) noexcept {
     return instance;
 }
 
-std::uint64_t sent_requests::add(const bridge_link& from, std::uint64_t id, time_point due, time_point now) {
+std::uint64_t sent_requests::add(const bridge_link& from, std::uint64_t id, time_point due, time_point now,
+                                 std::string addressee) {
     const auto number = ++last_;
-    sent_.emplace(number, request{.from = from, .id = id, .sent_at = now, .forgotten_at = due + after_deadline});
+    sent_.emplace(number, request{.from = from,
+                                  .id = id,
+                                  .addressee = std::move(addressee),
+                                  .sent_at = now,
+                                  .forgotten_at = due + after_deadline});
     numbers_.insert_or_assign(id, number);
     return number;
 }
@@ -139,15 +144,31 @@ void sent_requests::fail(requests::iterator which, const protocol::failure& why)
     }
 }
 
+// It remains, so that a bridge that acknowledges it later is told.
+void sent_requests::fail_unacknowledged(requests::iterator which, std::string why) {
+    const auto number = which->first;
+    auto waiting = which->second;
+    waiting.is_cancelled = true;
+    fail(which, {.code = errc::unavailable, .message = std::move(why)});
+    sent_.emplace(number, std::move(waiting));
+}
+
 void sent_requests::on_lost(const bridge_id& taker, std::string_view why) {
     std::vector<std::uint64_t> lost;
     for (const auto& [number, r] : sent_) {
-        if (r.taker == taker.instance && r.from.pool == taker.pool) {
+        const auto& at = r.taker.empty() ? r.addressee : r.taker;
+        if (at == taker.instance && r.from.pool == taker.pool && !(r.taker.empty() && r.is_cancelled)) {
             lost.push_back(number);
         }
     }
     for (const auto number : lost) {
-        if (const auto found = sent_.find(number); found != sent_.end()) {
+        const auto found = sent_.find(number);
+        if (found == sent_.end()) {
+            continue;
+        }
+        if (found->second.taker.empty()) { // it may have passed on a BIND
+            fail_unacknowledged(found, std::string{why});
+        } else {
             fail(found, {.code = errc::unavailable, .message = std::string{why}});
         }
     }
@@ -179,12 +200,7 @@ void sent_requests::on_time(time_point now) {
         if (found == sent_.end()) {
             continue;
         }
-        // It remains, so that a bridge that acknowledges it later is told.
-        auto waiting = found->second;
-        waiting.is_cancelled = true;
-        fail(found, {.code = errc::unavailable,
-                     .message = "no bridge of the pool '" + waiting.from.pool + "' acknowledged the request"});
-        sent_.emplace(number, std::move(waiting));
+        fail_unacknowledged(found, "no bridge of the pool '" + found->second.from.pool + "' acknowledged the request");
     }
 }
 

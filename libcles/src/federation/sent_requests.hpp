@@ -46,7 +46,9 @@ class sent_requests {
     explicit sent_requests(sent_requests_events& events) noexcept : events_(events) {}
 
     /// Returns the number by which the pool answers. \param due the deadline, which both ends know
-    std::uint64_t add(const bridge_link& from, std::uint64_t id, time_point due, time_point now);
+    /// \param addressee the bridge to which it is sent; empty: the one that NATS selects
+    std::uint64_t add(const bridge_link& from, std::uint64_t id, time_point due, time_point now,
+                      std::string addressee = {});
     /// It was not published.
     void refuse(std::uint64_t number, const protocol::failure& why);
     /// A message for that number from the pool.
@@ -55,7 +57,7 @@ class sent_requests {
     void on_unusable(std::uint64_t number, std::string_view message, time_point now, const protocol::failure& why);
     /// The node has cancelled it. A bridge that has not acknowledged it yet is told when it does.
     void cancel(std::uint64_t id);
-    /// What that bridge took is not answered any more.
+    /// What that bridge took, or was sent alone, is not answered any more.
     void on_lost(const bridge_id& taker, std::string_view why);
     void on_time(time_point now);
     /// The node has closed the link: nobody waits.
@@ -77,6 +79,7 @@ class sent_requests {
         bridge_link from;
         std::uint64_t id = 0;
         std::string taker{}; ///< its instance; empty: not acknowledged yet
+        std::string addressee{};
         time_point sent_at;
         time_point forgotten_at; ///< for lack of a reply
         bool is_cancelled = false;
@@ -87,6 +90,7 @@ class sent_requests {
     void note_round_trip(const std::string& pool, time_point::duration took);
     requests::iterator erase(requests::iterator which);
     void fail(requests::iterator which, const protocol::failure& why);
+    void fail_unacknowledged(requests::iterator which, std::string why);
     template <class Condition>
     void cancel_if(Condition concerns);
 

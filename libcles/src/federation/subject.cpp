@@ -83,8 +83,13 @@ subject of_bridge(subject made, std::string_view kind, std::string_view instance
 
 subject in_inbox(subject made, std::string_view instance, std::string_view what) {
     const auto number = protocol::number_between(what, 1, protocol::max_id);
-    if (is_instance(instance) && (number || what == "control")) {
-        made.kind = number ? subject_kind::reply : subject_kind::control;
+    const auto kind = number              ? subject_kind::reply
+                      : what == "request" ? subject_kind::request
+                      : what == "control" ? subject_kind::control
+                      : what == "seal"    ? subject_kind::question
+                                          : subject_kind::foreign;
+    if (is_instance(instance) && kind != subject_kind::foreign) {
+        made.kind = kind;
         made.instance = instance;
         made.number = number.value_or(0);
     }
@@ -118,6 +123,11 @@ bool is_instance(std::string_view text) noexcept { return protocol::parse_hex<st
 
 std::string instance_text(std::uint64_t drawn) { return protocol::hex_text(drawn); }
 
+bool are_of_one_member(std::string_view instance, std::string_view other) noexcept {
+    constexpr std::size_t number_digits = 6;
+    return instance.substr(0, number_digits) == other.substr(0, number_digits);
+}
+
 std::string request_subject(std::string_view pool, verb how, std::string_view node, std::string_view task) {
     return join({pool, token_of(how), encoded(node), encoded(task)});
 }
@@ -130,10 +140,12 @@ std::string feed_subject(std::string_view pool, std::string_view node, std::stri
 
 std::string heartbeat_subject(const bridge_id& of) { return join({of.pool, "beat", of.instance}); }
 std::string names_subject(const bridge_id& of) { return join({of.pool, "names", of.instance}); }
+std::string request_subject(const bridge_id& of) { return join({of.pool, "bridge", of.instance, "request"}); }
 std::string control_subject(const bridge_id& of) { return join({of.pool, "bridge", of.instance, "control"}); }
 std::string reply_subject(const bridge_id& of, std::uint64_t number) {
     return join({of.pool, "bridge", of.instance, std::to_string(number)});
 }
+std::string question_subject(const bridge_id& of) { return join({of.pool, "bridge", of.instance, "seal"}); }
 std::string inbox_filter(const bridge_id& of) { return join({of.pool, "bridge", of.instance, "*"}); }
 
 subject parse_subject(std::string_view text) {

@@ -28,6 +28,8 @@ struct bridge_id {
 
 bool is_instance(std::string_view text) noexcept;
 std::string instance_text(std::uint64_t drawn);
+/// Whether both are of one member of a secured fleet: its number is in the first 24 bits (core::message_seal).
+bool are_of_one_member(std::string_view instance, std::string_view other) noexcept;
 
 /// The group in which all bridges of a pool subscribe to its requests.
 inline constexpr std::string_view queue_group = "cles";
@@ -35,17 +37,21 @@ inline constexpr std::string_view queue_group = "cles";
 std::string request_subject(std::string_view pool, verb how, std::string_view node, std::string_view task);
 /// All requests of that verb.
 std::string request_filter(std::string_view pool, verb how);
+/// A request for that bridge, as a whole line.
+std::string request_subject(const bridge_id& of);
 std::string feed_subject(std::string_view pool, std::string_view node, std::string_view task);
 std::string heartbeat_subject(const bridge_id& of);
 std::string names_subject(const bridge_id& of);
 std::string control_subject(const bridge_id& of);
 std::string reply_subject(const bridge_id& of, std::uint64_t number);
-/// All messages for one bridge: replies and control.
+/// Questions of sealed bridges to each other (docs/security.md, "Through NATS").
+std::string question_subject(const bridge_id& of);
+/// All messages for one bridge: its requests, replies, control, questions.
 std::string inbox_filter(const bridge_id& of);
 inline constexpr std::string_view heartbeat_filter = "cles.*.beat.*";
 inline constexpr std::string_view names_filter = "cles.*.names.*";
 
-enum class subject_kind : std::uint8_t { foreign, request, feed, heartbeat, names, control, reply };
+enum class subject_kind : std::uint8_t { foreign, request, feed, heartbeat, names, control, reply, question };
 
 /// The parts of a subject; which ones depends on its kind.
 struct subject {
@@ -54,7 +60,7 @@ struct subject {
     cles::verb verb = cles::verb::pull;
     std::string node{};
     std::string task{};
-    std::string instance{};
+    std::string instance{}; ///< of a request: nothing if it is for any bridge of the pool
     std::uint64_t number = 0;
 
     [[nodiscard]] bridge_id bridge() const { return {pool, instance}; }

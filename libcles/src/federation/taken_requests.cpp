@@ -74,10 +74,10 @@ std::vector<std::uint64_t> taken_requests::requests_of(const bridge_id& by) cons
     return found;
 }
 
-std::vector<std::uint64_t> taken_requests::requests_of(std::string_view pool) const {
+std::vector<std::uint64_t> taken_requests::requests_of(std::string_view pool, std::string_view member) const {
     std::vector<std::uint64_t> found;
     for (const auto& [id, r] : taken_) {
-        if (r.by.pool == pool) {
+        if (r.by.pool == pool && r.member == member) {
             found.push_back(id);
         }
     }

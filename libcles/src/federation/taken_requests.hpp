@@ -36,6 +36,7 @@ class taken_requests {
         bridge_id by;             ///< without a pool: a program that is no bridge
         std::uint64_t number = 0; ///< by which that bridge knows it
         std::string reply;        ///< the subject for replies
+        std::string member{};     ///< the name of that bridge, in a secured fleet
     };
 
     /// Returns the id for the node's link; nothing if the request has arrived before.
@@ -48,8 +49,9 @@ class taken_requests {
     std::vector<const request*> take_unacknowledged();
     /// The requests of that bridge, which is lost.
     [[nodiscard]] std::vector<std::uint64_t> requests_of(const bridge_id& by) const;
-    /// The requests of a pool's bridges; of other programs if it is empty.
-    [[nodiscard]] std::vector<std::uint64_t> requests_of(std::string_view pool) const;
+    /// The requests that the node has on one link: of a pool's bridges, or in a secured fleet of that member's; of
+    /// other programs if `pool` is empty.
+    [[nodiscard]] std::vector<std::uint64_t> requests_of(std::string_view pool, std::string_view member) const;
     /// Nothing of that bridge can arrive any more: its numbers are forgotten.
     void forget(const bridge_id& by) { seen_.erase(by); }
     void clear();

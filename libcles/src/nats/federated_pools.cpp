@@ -5,6 +5,8 @@
 #include <cles/json_writer.hpp>
 
 #include "node/local_node.hpp"
+#include "node/session/request_checks.hpp"
+#include "port/node_security.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -57,6 +59,7 @@ class pool_transport final : public link_transport {
   public:
     explicit pool_transport(std::weak_ptr<federated_pools> by) : by_(std::move(by)) {}
 
+    [[nodiscard]] bool authenticates() const override { return by_.lock()->is_secured(); }
     // NATS listens for all hosts, unless it is told otherwise, and forwards to other servers.
     [[nodiscard]] bool is_exposed(const url&) const override { return true; }
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url&, const limits& bounds) override {
@@ -104,10 +107,8 @@ std::unique_ptr<link_transport> federated_pools::make_transport() {
 // -- the node ------------------------------------------------------------------------------------------------------
 
 void federated_pools::start(core::local_node& host) {
-    if (host.node().security) {
-        throw error(errc::invalid_option, "federation is refused with security: what crosses NATS is not sealed");
-    }
     host_ = host.weak_from_this();
+    is_secured_ = host.node().security != nullptr;
     host.listeners().listen("pool://" + options_.pool, host.is_insecure());
 }
 
@@ -116,7 +117,8 @@ void federated_pools::listen(const asio::any_io_executor& executor, const limits
     const auto host = host_.lock();
     bridge_.emplace(
         bridging::bridge::settings{.pool = options_.pool, .node = host->node().name, .max_line = bounds.line},
-        static_cast<bridging::bridge_output&>(*this));
+        static_cast<bridging::bridge_output&>(*this),
+        is_secured_ ? static_cast<bridging::bridge_trust*>(this) : nullptr);
 }
 
 void federated_pools::accept(std::function<void(link_ptr)> on_link) {
@@ -144,6 +146,17 @@ std::string federated_pools::address_of(std::string_view target) const {
     return pool.empty() ? pool : "pool://" + pool;
 }
 
+void federated_pools::on_security_changed() {
+    if (bridge_ && !stopped_) {
+        if (channel_ && channel_->instance() != connected_as_) { // this node is another member, or none
+            connection_->reconnect();
+        }
+        bridge_->on_security_changed(now());
+        flush();
+        run_later();
+    }
+}
+
 std::vector<core::other_pools::known_pool> federated_pools::list() const {
     std::vector<known_pool> all;
     if (bridge_) {
@@ -158,7 +171,7 @@ std::vector<core::other_pools::known_pool> federated_pools::list() const {
 
 void federated_pools::leave() {
     if (!std::exchange(leaving_, true) && connection_) {
-        bridge_->leave();
+        bridge_->leave(now());
         connection_->flush();
     }
     stop_if_finished();
@@ -172,6 +185,7 @@ void federated_pools::stop_if_finished() {
             connection_->flush();
             connection_->stop();
         }
+        channel_.reset();
         if (timer_) {
             timer_->cancel();
         }
@@ -211,8 +225,10 @@ void federated_pools::serve_dials() {
 }
 
 std::shared_ptr<pool_link> federated_pools::make_link(bridge_link which) {
-    auto made =
-        std::make_shared<pool_link>(std::shared_ptr<pool_link_owner>{shared_from_this(), this}, which, options_.pool);
+    // The nouns for other pools are bound in this node's name.
+    const bool is_own = which.what == bridge_link::role::publications && is_secured_;
+    auto made = std::make_shared<pool_link>(std::shared_ptr<pool_link_owner>{shared_from_this(), this}, which,
+                                            options_.pool, is_own ? host_.lock()->node().name : which.member);
     links_.insert_or_assign(std::move(which), made);
     return made;
 }
@@ -349,22 +365,73 @@ void federated_pools::on_event(const event& e) {
         }
     };
     switch (e.what) {
-    case event::kind::connected: {
-        log(log_level::info, "connected to NATS, as a bridge of the pool '" + options_.pool + "'");
-        last_problem_.clear();
-        logged_.clear();
-        connection_->use(e.connection);
-        std::random_device random;
-        bridge_->on_connected((std::uint64_t{random()} << 32U) | random(), e.max_message, now());
-        break;
-    }
+    case event::kind::connected: on_connected(e); break;
     case event::kind::disconnected:
         log_once("the connection to NATS was lost: " + e.text);
         bridge_->on_disconnected(e.text);
         break;
     case event::kind::refused: log_once("cannot connect to NATS: " + e.text + " (trying again)"); break;
     case event::kind::problem: log_once("NATS: " + e.text); break;
-    case event::kind::message: bridge_->on_message(e.subject, e.reply, e.text, now()); break;
+    case event::kind::message: on_message(e); break;
+    }
+}
+
+void federated_pools::on_connected(const event& e) {
+    log(log_level::info, "connected to NATS, as a bridge of the pool '" + options_.pool + "'");
+    last_problem_.clear();
+    logged_.clear();
+    connection_->use(e.connection);
+    if (!is_secured_) {
+        std::random_device random;
+        bridge_->on_connected((std::uint64_t{random()} << 32U) | random(), e.max_message, now());
+        return;
+    }
+    const auto host = host_.lock();
+    if (!host) {
+        return;
+    }
+    channel_.emplace(host->node().security->seal_messages(), options_.pool);
+    connected_as_ = channel_->instance();
+    if (connected_as_ == 0) {
+        log(log_level::error, "this node is not in the roster: it can seal nothing for other pools");
+    }
+    bridge_->on_connected(connected_as_, e.max_message - std::min(e.max_message, core::message_seal::overhead), now());
+}
+
+void federated_pools::on_message(const event& e) {
+    const auto at = now();
+    if (!is_secured_) {
+        bridge_->on_message(e.subject, e.reply, e.text, at);
+        return;
+    }
+    if (!channel_) {
+        return;
+    }
+    using outcome = bridging::sealed_channel::outcome;
+    const auto found = channel_->receive(e.subject, e.reply, e.text, at);
+    switch (found.what) {
+    case outcome::opened:
+        bridge_->on_message(e.subject, e.reply, found.message, at, {found.sender, found.instance});
+        break;
+    case outcome::unproven: bridge_->on_unproven(e.subject, e.reply, at); break;
+    case outcome::refused: bridge_->on_refused(e.subject, found.why, at); break;
+    case outcome::consumed: break;
+    }
+    if (found.heartbeat_soon) {
+        bridge_->announce_soon(at);
+    }
+    if (channel_) { // a link that was refused may have been the last one
+        publish_questions();
+    }
+}
+
+void federated_pools::publish_questions() {
+    constexpr std::size_t always_sent = 4096;
+    for (auto& each : channel_->take_questions()) {
+        if (each.message.size() > always_sent && unsent() + reserved_room > nats_connection::max_unsent) {
+            continue; // a roster, which will be asked for again
+        }
+        connection_->publish(std::move(each.subject), std::move(each.reply), std::move(each.message));
     }
 }
 
@@ -372,7 +439,16 @@ void federated_pools::on_event(const event& e) {
 
 bool federated_pools::publish(std::string subject, std::string reply, std::string message, room in) {
     const bool has_room = in == room::reserved || unsent() + reserved_room <= nats_connection::max_unsent;
-    return connection_ && has_room && connection_->publish(std::move(subject), std::move(reply), std::move(message));
+    if (!connection_ || !has_room) {
+        return false;
+    }
+    if (is_secured_) {
+        message = channel_ ? channel_->seal(subject, reply, message) : std::string{};
+        if (message.empty()) { // this node is no member
+            return false;
+        }
+    }
+    return connection_->publish(std::move(subject), std::move(reply), std::move(message));
 }
 
 // `run` does it once for all.
@@ -494,6 +570,46 @@ void federated_pools::log(log_level level, const std::string& text) {
     }
 }
 
+// -- members -------------------------------------------------------------------------------------------------------
+
+bool federated_pools::may_forward(std::string_view member) const {
+    const auto host = host_.lock();
+    return host && host->node().security->may_forward(member, host->node().name);
+}
+
+std::string federated_pools::how_to_permit(std::string_view member) const {
+    const auto host = host_.lock();
+    return core::how_to_permit_forwarding(member, host ? host->node().name : std::string{});
+}
+
+std::optional<protocol::failure> federated_pools::refusal(std::string_view member,
+                                                          const protocol::request_line& bind) const {
+    const auto host = host_.lock();
+    const identity peer{.transport = "pool",
+                        .address = "pool://" + options_.pool,
+                        .name = std::string{member},
+                        .uid = {},
+                        .local = false};
+    return host ? core::refusal_reason(host->node(), peer, bind) : std::nullopt;
+}
+
+std::uint32_t federated_pools::roster_version() const {
+    const auto host = host_.lock();
+    return host ? host->node().security->roster_version() : 0;
+}
+
+void federated_pools::on_lost(const bridging::bridge_id& gone) {
+    if (channel_) {
+        channel_->forget(gone);
+    }
+}
+
+void federated_pools::on_stated_roster(const bridging::bridge_id& by, std::uint32_t version) {
+    if (channel_) {
+        channel_->on_stated_roster(by, version, now());
+    }
+}
+
 // -- for the links -------------------------------------------------------------------------------------------------
 
 void federated_pools::on_line(const bridge_link& from, std::string_view line) { bridge_->on_line(from, line, now()); }
@@ -539,7 +655,19 @@ void federated_pools::write_metrics(json_writer& w) const {
         w.key("problem");
         w.value(std::string_view{last_problem_});
     }
+    if (channel_) {
+        w.key("member");
+        w.value(connected_as_ != 0);
+    }
     if (bridge_) {
+        if (!bridge_->not_permitted().empty()) {
+            w.key("not_permitted");
+            w.begin_array();
+            for (const auto& member : bridge_->not_permitted()) {
+                w.value(std::string_view{member});
+            }
+            w.end_array();
+        }
         w.key("pools");
         w.begin_array();
         for (const auto& [name, p] : bridge_->pools().pools()) {

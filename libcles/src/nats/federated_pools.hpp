@@ -6,6 +6,7 @@
 
 #include "federation/bridge.hpp"
 #include "federation/logged_problems.hpp"
+#include "federation/sealed_channel.hpp"
 #include "nats/nats_connection.hpp"
 #include "nats/pool_link.hpp"
 #include "node/routing/other_pools.hpp"
@@ -38,6 +39,7 @@ namespace cles::nats {
 /// All of it runs on the node's executor.
 class federated_pools final : public core::other_pools,
                               private bridging::bridge_output,
+                              private bridging::bridge_trust,
                               private pool_link_owner,
                               public std::enable_shared_from_this<federated_pools> {
   public:
@@ -50,11 +52,14 @@ class federated_pools final : public core::other_pools,
     /// The transport `pool` of the node.
     [[nodiscard]] std::unique_ptr<link_transport> make_transport();
     void write_metrics(json_writer& w) const;
+    /// Whether the fleet is secured: then messages are sealed, and bridges authenticated.
+    [[nodiscard]] bool is_secured() const noexcept { return is_secured_; }
 
     // core::other_pools
     void start(core::local_node& host) override;
     [[nodiscard]] std::string address_of(std::string_view target) const override;
     [[nodiscard]] std::vector<known_pool> list() const override;
+    void on_security_changed() override;
 
     // For the transport.
     void listen(const boost::asio::any_io_executor& executor, const limits& bounds);
@@ -82,6 +87,15 @@ class federated_pools final : public core::other_pools,
     [[nodiscard]] std::vector<std::string> home_names() const override;
     void log(log_level level, const std::string& text) override;
 
+    // bridging::bridge_trust
+    [[nodiscard]] bool may_forward(std::string_view member) const override;
+    [[nodiscard]] std::string how_to_permit(std::string_view member) const override;
+    [[nodiscard]] std::optional<protocol::failure> refusal(std::string_view member,
+                                                           const protocol::request_line& bind) const override;
+    [[nodiscard]] std::uint32_t roster_version() const override;
+    void on_lost(const bridging::bridge_id& gone) override;
+    void on_stated_roster(const bridging::bridge_id& by, std::uint32_t version) override;
+
     // pool_link_owner
     void on_line(const bridging::bridge_link& from, std::string_view line) override;
     void schedule(std::shared_ptr<pool_link> which) override;
@@ -93,6 +107,9 @@ class federated_pools final : public core::other_pools,
     void on_wake();
     void take_events();
     void on_event(const event& e);
+    void on_connected(const event& e);
+    void on_message(const event& e);
+    void publish_questions();
     void run_later();
     void flush();
     void run();
@@ -115,6 +132,8 @@ class federated_pools final : public core::other_pools,
     std::optional<boost::asio::executor_work_guard<boost::asio::any_io_executor>> work_;
     std::weak_ptr<core::local_node> host_;
     std::optional<bridging::bridge> bridge_;
+    std::optional<bridging::sealed_channel> channel_; // in a secured fleet, of the last connection
+    std::uint64_t connected_as_ = 0;                  // the instance on that
     std::unique_ptr<nats_connection> connection_;
     std::optional<boost::asio::steady_timer> timer_;
     time_point timer_due_ = time_point::max();
@@ -130,6 +149,7 @@ class federated_pools final : public core::other_pools,
     std::uint32_t last_link_ = 0;
     std::uint64_t last_dial_ = 0;
     bool claimed_ = false;
+    bool is_secured_ = false;
     bool leaving_ = false;
     bool stopped_ = false;
     bool run_posted_ = false;

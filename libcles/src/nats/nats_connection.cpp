@@ -378,6 +378,7 @@ std::string nats_connection::connect() {
     }
     auto why = configure(made);
     if (why.empty()) {
+        renews_ = false; // this one is new
         closed_ = false;
         wants_write_ = false;
         if (const auto code = natsConnection_Connect(&connection_, made); code != NATS_OK) {
@@ -399,9 +400,14 @@ std::string nats_connection::connect() {
     return {};
 }
 
+void nats_connection::reconnect() noexcept {
+    renews_ = true;
+    signal();
+}
+
 // Returns why it has ended.
 std::string nats_connection::serve() {
-    while (!stopped_ && !closed_ && !natsConnection_IsClosed(connection_)) {
+    while (!stopped_ && !closed_ && !renews_ && !natsConnection_IsClosed(connection_)) {
         const bool all_applied = apply_commands();
         const bool wants_read = wants_more();
         std::array<pollfd, 2> waited{pollfd{.fd = wake_descriptor_, .events = POLLIN, .revents = 0},
@@ -429,6 +435,9 @@ std::string nats_connection::serve() {
     if (stopped_) {
         send_rest();
         return {};
+    }
+    if (renews_) {
+        return "this node is another member of its fleet, or none, and connects again";
     }
     const char* words = nullptr;
     natsConnection_GetLastError(connection_, &words);

@@ -68,6 +68,8 @@ class nats_connection {
 
     /// The executor has noticed this connection: what follows is meant for it.
     void use(std::uint64_t connection) noexcept { used_ = connection; }
+    /// Ends the connection, and makes another one.
+    void reconnect() noexcept;
     /// Returns false if too much waits to be sent.
     bool publish(std::string subject, std::string reply, std::string text);
     /// \param group the queue group; empty: none \param bulk messages that may be dropped if too many wait to be taken
@@ -139,6 +141,7 @@ class nats_connection {
     std::atomic<std::uint64_t> dropped_{0};
     std::atomic<bool> stopped_{false};
     std::atomic<bool> closed_{false};
+    std::atomic<bool> renews_{false};
     std::atomic<bool> wants_write_{false};
     std::atomic<int> socket_{-1};
     std::atomic<std::thread::id> own_thread_{};

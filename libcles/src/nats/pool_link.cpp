@@ -25,10 +25,11 @@ std::string address_of(const bridging::bridge_link& which, const std::string& ow
 
 } // namespace
 
-pool_link::pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link which, std::string own_pool)
+pool_link::pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link which, const std::string& own_pool,
+                     std::string member)
     : by_(std::move(by)), which_(std::move(which)), peer_{.transport = "pool",
                                                           .address = address_of(which_, own_pool),
-                                                          .name = {},
+                                                          .name = std::move(member),
                                                           .uid = {},
                                                           .local = false} {}
 

@@ -48,7 +48,9 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     /// Bytes that may wait for the node before it is full.
     static constexpr std::size_t inbox_capacity = 1U << 20U;
 
-    pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link which, std::string own_pool);
+    /// \param member the authenticated name of the other end; empty: it has none
+    pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link which, const std::string& own_pool,
+              std::string member = {});
 
     void start(std::shared_ptr<link_events> owner) override;
     std::string& output() override { return output_; }

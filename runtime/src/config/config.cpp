@@ -42,13 +42,10 @@ void check_exposure(const config& setup, const std::string& key, const std::stri
 }
 
 void check_federation(const config& setup) {
-    if (setup.security.is_on()) {
-        throw config_error(setup.location_of("federation"),
-                           "is refused with 'security': what crosses NATS is not sealed");
-    }
-    if (!setup.insecure) {
-        throw config_error(setup.location_of("federation"),
-                           "whoever reaches the NATS server can send requests, which requires 'insecure: true'");
+    if (!setup.insecure && !setup.security.is_on()) {
+        throw config_error(
+            setup.location_of("federation"),
+            "whoever reaches the NATS server can send requests, which requires 'security' or 'insecure: true'");
     }
     if (!setup.pool.empty() && setup.pool != setup.federation.pool) {
         throw config_error(setup.location_of("federation.pool"),

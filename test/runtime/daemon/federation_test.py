@@ -386,16 +386,11 @@ class Federation(BridgesTest):
                 ("insecure: true\npool: west\nfederation: {nats: 'nats://h:4222', pool: north}\n", "'north' is another pool than"),
                 ("federation: yes\n", "is not 'off'"),
                 ("federation: {nats: 'nats://h:4222', pool: north}\n",
-                 "federation: whoever reaches the NATS server can send requests, which requires 'insecure: true'")):
+                 "federation: whoever reaches the NATS server can send requests, which requires 'security' or 'insecure: true'")):
             file = self.folder.write(DEFAULTS + text)
             code, _, errors = clesd("--config", file, "--check")
             self.assertEqual(code, 2, text)
             self.assertIn(why, errors)
-        file = self.folder.write(DEFAULTS.replace("tcp://", "tls://") + "security: {keys: /k}\n"
-                                 "federation: {nats: 'nats://h:4222', pool: north}\n")
-        code, _, errors = clesd("--config", file, "--check")
-        self.assertEqual(code, 2)
-        self.assertIn("federation: is refused with 'security': what crosses NATS is not sealed", errors)
         file = self.folder.write(DEFAULTS + "insecure: true\nfederation: {nats: ['nats://a:1', 'tls://b:2'], pool: north, token: /t, tls: {ca: /c}}\n")
         _, text, _ = clesd("--config", file, "--print-config")
         self.assertIn('federation: {nats: ["nats://a:1", "tls://b:2"], pool: "north", token: "/t", tls: {ca: "/c"}}', text)

@@ -83,6 +83,11 @@ class NatsClient:
 
     def read(self):
         """The next message: its subject and its text."""
+        subject, _, data = self.read_bytes()
+        return subject, data.decode()
+
+    def read_bytes(self):
+        """The next message: its subject, the one for replies, and its bytes."""
         while True:
             line = self.stream.readline().decode()
             if line.startswith("PING"):
@@ -90,7 +95,7 @@ class NatsClient:
             elif line.startswith("MSG"):
                 parts = line.split()
                 data = self.stream.read(int(parts[-1]) + 2)[:-2]
-                return parts[1], data.decode()
+                return parts[1], parts[3] if len(parts) == 5 else "", data
             elif line.startswith("-ERR") or not line:
                 raise AssertionError(line or "the server has closed the connection")
 

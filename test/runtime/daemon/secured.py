@@ -77,7 +77,8 @@ class Node:
 
     def messages(self):
         with open(self.log_file, encoding="utf-8") as log:
-            return [json.loads(line)["message"] for line in log if line.endswith("\n")]
+            return [json.loads(line)["message"] if line.startswith("{") else line  # `clesd` before it can log
+                    for line in log if line.endswith("\n")]
 
     def ask(self, line):
         with socket.socket(socket.AF_UNIX) as link:

@@ -59,6 +59,7 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
     };
     to.on_delegate("once", count);
     to.on_delegate("again", count, {.idempotent = true});
+    to.on_delegate("ordered", count, {.must_be_signed = true});
     to.on_delegate("fails", [marks](const cles::request& asked) {
         marks->leave(asked);
         throw std::runtime_error{"as it should"};

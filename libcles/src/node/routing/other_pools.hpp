@@ -22,6 +22,8 @@ class other_pools {
     virtual void start(local_node& host) = 0;
     /// The URL of the pool that has this node, which is not known at home. Empty if none has.
     [[nodiscard]] virtual std::string address_of(std::string_view target) const = 0;
+    /// The roster or the rights have changed, in a secured fleet.
+    virtual void on_security_changed() = 0;
 
     struct known_pool {
         std::string name;

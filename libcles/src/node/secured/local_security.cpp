@@ -3,6 +3,7 @@
 
 #include "node/local_node.hpp"
 #include "node/membership/gossip.hpp"
+#include "node/routing/other_pools.hpp"
 #include "node/secured/roster_exchange.hpp"
 #include "protocol/request_line.hpp"
 
@@ -33,6 +34,9 @@ void local_security::apply_change() {
     }
     host_.connections().on_security_changed();
     host_.feeds().on_security_changed();
+    if (node.pools != nullptr) {
+        node.pools->on_security_changed();
+    }
     if (auto* const routes = node.gossip_responder) {
         routes->reach().on_rights_changed();
     }
