@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
-// PULL through two bridges of different pools, against request and reply of two bare programs of libnats, through the
-// same server: latency with one request in flight, and requests a second with 64. Prints JSON.
+// PULL through two bridges of different pools, without security and sealed, against request and reply of two bare
+// programs of libnats, through the same server: latency with one request in flight, and requests a second with 64.
+// Prints JSON.
 //
-//     cles_federation_cost URL [requests of a round]      perf/federation/measure.py starts a server for it
+//     cles_federation_cost URL FLEET [requests of a round]
+//
+// FLEET contains the keys of `gate` and `hub`; perf/federation/measure.py makes them, and starts a server.
 #include <cles/federation.hpp>
 #include <cles/json_reader.hpp>
+#include <cles/security.hpp>
 #include <cles/service.hpp>
 
 #include "perf/support/child_process.hpp"
@@ -19,7 +23,6 @@
 #include <nats/nats.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -41,7 +44,6 @@ using cles::perf::localization;
 constexpr std::size_t rounds = 5;
 constexpr std::size_t in_flight = 64;
 constexpr const char* bare_subject = "bare.gate.localization";
-constexpr const char* federated_noun = "north.gate:localization";
 
 std::string text_of(const localization& value) {
     std::string text;
@@ -149,17 +151,27 @@ class bare_requester {
 
 // -- two bridges ---------------------------------------------------------------------------------------------------
 
-cles::service_options bridge_options(const std::string& url, const std::string& name, const std::string& pool) {
+struct pools {
+    std::string url;
+    std::string keys;  // empty: without security
+    std::string north; // where the task is
+    std::string south;
+};
+
+cles::service_options bridge_options(const pools& of, const std::string& name, const std::string& pool) {
     cles::service_options options{.name = name};
     options.routing = cles::routing();
-    options.insecure = true;
-    options.federation = cles::federation({.servers = {url}, .pool = pool});
+    options.insecure = of.keys.empty();
+    if (!of.keys.empty()) {
+        options.security = cles::secured(of.keys + '/' + name);
+    }
+    options.federation = cles::federation({.servers = {of.url}, .pool = pool});
     return options;
 }
 
-void serve_federated(const std::string& url, const cles::perf::child_process::announce& ready) {
+void serve_federated(const pools& of, const cles::perf::child_process::announce& ready) {
     boost::asio::io_context io{1};
-    cles::service gate{io, bridge_options(url, "gate", "north")};
+    cles::service gate{io, bridge_options(of, "gate", of.north)};
     std::uint64_t count = 0;
     gate.on_pull("localization", [&count] { return cles::perf::sample(++count); });
     ready("federated");
@@ -168,16 +180,27 @@ void serve_federated(const std::string& url, const cles::perf::child_process::an
 
 class federated_requester {
   public:
-    explicit federated_requester(const std::string& url) : hub_(io_, bridge_options(url, "hub", "south")) {
+    explicit federated_requester(const pools& of)
+        : noun_(of.north + ".gate:localization"), hub_(io_, bridge_options(of, "hub", of.south)) {
+        reach();
+    }
+
+    /// The bridge was silent while others were measured, so the other end may have to find it again.
+    void reach() {
+        const auto until = std::chrono::steady_clock::now() + std::chrono::seconds{5};
         boost::system::error_code code;
-        for (int attempt = 0; attempt == 0 || (attempt < 50 && code); ++attempt) {
-            hub_.async_pull<localization>(federated_noun, [&](boost::system::error_code result, const localization&) {
+        do {
+            hub_.async_pull<localization>(noun_, [&](boost::system::error_code result, const localization&) {
                 code = result;
                 io_.stop();
             });
             io_.run();
             io_.restart();
-        }
+            if (code) {
+                io_.run_for(std::chrono::milliseconds{20});
+                io_.restart();
+            }
+        } while (code && std::chrono::steady_clock::now() < until);
         if (code) {
             throw std::runtime_error{"the other pool is not found: " + code.message()};
         }
@@ -215,19 +238,19 @@ class federated_requester {
         --left_;
         ++open_;
         const auto begun = std::chrono::steady_clock::now();
-        hub_.async_pull<localization>(federated_noun,
-                                      [this, begun](boost::system::error_code code, const localization& value) {
-                                          if (code || !is_sample(value)) {
-                                              throw std::runtime_error{"a request failed: " + code.message()};
-                                          }
-                                          if (recorder_ != nullptr) {
-                                              recorder_->record(std::chrono::steady_clock::now() - begun);
-                                          }
-                                          --open_;
-                                          ask();
-                                      });
+        hub_.async_pull<localization>(noun_, [this, begun](boost::system::error_code code, const localization& value) {
+            if (code || !is_sample(value)) {
+                throw std::runtime_error{"a request failed: " + code.message()};
+            }
+            if (recorder_ != nullptr) {
+                recorder_->record(std::chrono::steady_clock::now() - begun);
+            }
+            --open_;
+            ask();
+        });
     }
 
+    std::string noun_;
     boost::asio::io_context io_{1};
     cles::service hub_;
     cles::perf::latency_recorder* recorder_ = nullptr;
@@ -237,53 +260,69 @@ class federated_requester {
 
 // -- the comparison ------------------------------------------------------------------------------------------------
 
+struct figures {
+    std::vector<double> p50s; // of each round, in microseconds
+    std::vector<double> rates;
+};
+
 double median(std::vector<double> of) {
     std::sort(of.begin(), of.end());
     return of[of.size() / 2];
 }
 
-void compare(const std::string& url, std::size_t requests) {
+template <class Requester>
+void measure(Requester& ask, cles::perf::latency_recorder& recorder, std::size_t requests, figures& into) {
+    recorder.clear();
+    ask.ask_one_by_one(recorder);
+    into.p50s.push_back(recorder.quantiles().p50);
+    into.rates.push_back(ask.requests_per_second(requests * 5));
+}
+
+void compare(const std::string& url, const std::string& fleet, std::size_t requests) {
+    const pools plain{.url = url, .keys = {}, .north = "north", .south = "south"};
+    const pools sealed{.url = url, .keys = fleet, .north = "sealed_north", .south = "sealed_south"};
     const auto core = cles::perf::place_ends().server;
     cles::perf::child_process bare{core, [&](const auto& ready) { serve_bare(url, ready); }};
-    cles::perf::child_process federated{core, [&](const auto& ready) { serve_federated(url, ready); }};
+    cles::perf::child_process plain_gate{core, [&](const auto& ready) { serve_federated(plain, ready); }};
+    cles::perf::child_process sealed_gate{core, [&](const auto& ready) { serve_federated(sealed, ready); }};
     bare.announced();
-    federated.announced();
+    plain_gate.announced();
+    sealed_gate.announced();
     bare_requester bare_ask{url};
-    federated_requester federated_ask{url};
+    federated_requester plain_ask{plain};
+    federated_requester sealed_ask{sealed};
 
     cles::perf::latency_recorder recorder{requests};
-    std::array<std::vector<double>, 2> latency;
-    std::array<std::vector<double>, 2> rate;
+    figures of_bare;
+    figures of_plain;
+    figures of_sealed;
     for (std::size_t round = 0; round < rounds; ++round) {
-        recorder.clear();
-        bare_ask.ask_one_by_one(recorder);
-        latency[0].push_back(recorder.quantiles().p50);
-        recorder.clear();
-        federated_ask.ask_one_by_one(recorder);
-        latency[1].push_back(recorder.quantiles().p50);
-        rate[0].push_back(bare_ask.requests_per_second(requests * 5));
-        rate[1].push_back(federated_ask.requests_per_second(requests * 5));
+        measure(bare_ask, recorder, requests, of_bare);
+        plain_ask.reach();
+        measure(plain_ask, recorder, requests, of_plain);
+        sealed_ask.reach();
+        measure(sealed_ask, recorder, requests, of_sealed);
     }
-    const auto bare_p50 = median(latency[0]);
-    const auto p50 = median(latency[1]);
-    const auto bare_rate = median(rate[0]);
-    const auto federated_rate = median(rate[1]);
-    std::printf(
-        R"({"bare_p50_us":%.1f,"p50_us":%.1f,"latency_ratio":%.2f,"bare_per_s":%.0f,"per_s":%.0f,"rate_ratio":%.2f})"
-        "\n",
-        bare_p50, p50, p50 / bare_p50, bare_rate, federated_rate, federated_rate / bare_rate);
+    const auto print = [](const char* key, const figures& of, char end) {
+        std::printf(R"("%s":{"p50_us":%.1f,"per_s":%.0f}%c)", key, median(of.p50s), median(of.rates), end);
+    };
+    std::putchar('{');
+    print("bare", of_bare, ',');
+    print("plain", of_plain, ',');
+    print("sealed", of_sealed, '}');
+    std::putchar('\n');
 }
 
 } // namespace
 
 int main(int argc, char** argv) {
     try {
-        if (argc < 2) {
-            std::fputs("usage: cles_federation_cost URL [requests of a round]\n", stderr);
+        if (argc < 3) {
+            std::fputs("usage: cles_federation_cost URL FLEET [requests of a round]\n", stderr);
             return 2;
         }
         constexpr std::size_t usual = 4'000;
-        compare(argv[1], argc > 2 ? std::strtoul(argv[2], nullptr, 10) : usual);
+        compare(argv[1], argv[2], argc > 3 ? std::strtoul(argv[3], nullptr, 10) : usual);
         std::fflush(stdout);
         std::_Exit(0); // the threads of the library
     } catch (const std::exception& failure) {
