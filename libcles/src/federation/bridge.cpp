@@ -47,6 +47,12 @@ bool acknowledges_for_another(std::string_view message, std::string_view sender)
     return !taker.empty() && taker != sender;
 }
 
+protocol::failure not_known_yet(const std::string& node) {
+    return {.code = errc::busy,
+            .message = "the bridge '" + node + "' does not know the one that asks yet",
+            .retry_ms = protocol::default_retry_ms};
+}
+
 std::string noun_of(const protocol::request_line& r) {
     return std::string{r.noun.target}.append(":").append(r.noun.path);
 }
@@ -292,10 +298,7 @@ void bridge::on_unproven(std::string_view where, std::string_view reply, time_po
     now_ = now;
     const auto about = parse_subject(where);
     if (connected_ && about.kind == subject_kind::request && about.bridge() == self_) {
-        refuse_foreign(std::string{reply},
-                       {.code = errc::busy,
-                        .message = "the bridge '" + setup_.node + "' does not know the one that asks yet",
-                        .retry_ms = protocol::default_retry_ms});
+        refuse_foreign(std::string{reply}, not_known_yet(setup_.node));
     }
 }
 
@@ -861,9 +864,7 @@ std::optional<protocol::failure> bridge::why_not_served(const taken_requests::re
                                  .message = "'" + by.member + "' may not forward for '" + setup_.node + "' " +
                                             trust_->how_to_permit(by.member)};
     }
-    return protocol::failure{.code = errc::busy,
-                             .message = "the bridge '" + setup_.node + "' does not know the one that asks yet",
-                             .retry_ms = protocol::default_retry_ms};
+    return not_known_yet(setup_.node);
 }
 
 // Whether its requests can be recognised if they arrive again. It may not be known yet.
