@@ -99,14 +99,7 @@ BOOST_AUTO_TEST_CASE(the_vector_is_opened) {
 }
 
 BOOST_AUTO_TEST_CASE(the_vector_is_made) {
-    class vector_salt final : public entropy {
-      public:
-        explicit vector_salt(bytes salt) : salt_(std::move(salt)) {}
-        void fill(std::span<std::uint8_t> out) override { std::ranges::copy(salt_, out.begin()); }
-
-      private:
-        bytes salt_;
-    } random{from_hex(vector_text("group", "salt"))};
+    cles::security::test::fixed_salt random{from_hex(vector_text("group", "salt"))};
     cles::security::fleet car2{"car2", vector_key("car2"), reread(text_at(vectors(), "roster"))};
     group_sender sender{car2, random, vectors().at("group").at("counter").to_number<std::uint64_t>()};
     BOOST_TEST(to_hex(sender.seal(vector_text("group", "line"))) == vector_text("group", "datagram"));

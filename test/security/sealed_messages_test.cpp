@@ -203,14 +203,7 @@ BOOST_AUTO_TEST_CASE(the_vectors_are_opened) {
 }
 
 BOOST_AUTO_TEST_CASE(the_vector_is_made) {
-    class vector_salt final : public entropy {
-      public:
-        explicit vector_salt(bytes salt) : salt_(std::move(salt)) {}
-        void fill(std::span<std::uint8_t> out) override { std::ranges::copy(salt_, out.begin()); }
-
-      private:
-        bytes salt_;
-    } random{from_hex(vector_text("pool", "salt"))};
+    cles::security::test::fixed_salt random{from_hex(vector_text("pool", "salt"))};
     cles::security::fleet known{"car2", vector_key("car2"), reread(text_at(vectors(), "roster"))};
     cles::security::sealed_messages writer{
         known, random, {}, vectors().at("pool").at("counter").to_number<std::uint64_t>()};

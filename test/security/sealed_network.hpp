@@ -30,6 +30,16 @@ inline std::string vector_text(std::string_view object, std::string_view key) {
     return text_at(vectors().at(object).as_object(), key);
 }
 
+/// The salt of a test vector.
+class fixed_salt final : public entropy {
+  public:
+    explicit fixed_salt(bytes salt) : salt_(std::move(salt)) {}
+    void fill(std::span<std::uint8_t> out) override { std::ranges::copy(salt_, out.begin()); }
+
+  private:
+    bytes salt_;
+};
+
 /// Repeats itself for the same seed.
 class seeded_entropy final : public entropy {
   public:

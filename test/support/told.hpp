@@ -74,4 +74,17 @@ class told_feed final : public core::subscription {
     observed_source tell_;
 };
 
+/// A feed of the node itself that keeps the numbers of what it receives: "1 2 gap 5 ".
+class numbers_feed final : public core::subscription {
+  public:
+    using subscription::subscription;
+    std::string heard;
+
+  private:
+    bool on_event(const detail::raw_event& event, core::feed_mailbox::hand_over) override {
+        heard += event.kind == feed_event::gap ? "gap " : std::to_string(event.seq) + " ";
+        return true;
+    }
+};
+
 } // namespace cles::test

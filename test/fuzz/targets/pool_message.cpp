@@ -17,6 +17,7 @@
 // than its question whether car2 is alive; no forged question counts; its roster never becomes an older one; after a
 // silence and a new connection, nothing that was sent before counts.
 #include "fuzz/fuzz.hpp"
+#include "fuzz/seeded_keys.hpp"
 #include "security/fleet/fleet_authority.hpp"
 #include "security/keys/byte_text.hpp"
 #include "security/messages/sealed_messages.hpp"
@@ -43,23 +44,6 @@ using namespace cles::security;
 using verdict = core::message_seal::verdict;
 
 constexpr std::size_t most_steps = 100;
-
-class seeded_entropy final : public entropy {
-  public:
-    explicit seeded_entropy(std::uint64_t seed) : engine_(seed) {}
-    void fill(std::span<std::uint8_t> out) override {
-        std::ranges::generate(out, [this] { return static_cast<std::uint8_t>(engine_()); });
-    }
-
-  private:
-    std::mt19937_64 engine_;
-};
-
-signing_key key_from(std::uint8_t seed) {
-    secret_bytes whole{32};
-    std::ranges::fill(whole.span(), seed);
-    return signing_key{std::move(whole)};
-}
 
 // The rosters that come into force, made once.
 const std::vector<std::shared_ptr<const roster>>& rosters() {

@@ -16,6 +16,7 @@
 // For every input: car1 opens no line that car2 has not sealed for it, and none more often; nothing is answered that no
 // member has sealed; what is kept is limited; without activity nothing is kept.
 #include "fuzz/fuzz.hpp"
+#include "fuzz/seeded_keys.hpp"
 #include "security/datagrams/datagram_sessions.hpp"
 #include "security/datagrams/group_receiver.hpp"
 #include "security/datagrams/group_sender.hpp"
@@ -41,23 +42,6 @@ constexpr std::size_t most_steps = 100;
 constexpr std::size_t most_handshakes = 20; // they take the time
 
 using bytes = std::vector<std::uint8_t>;
-
-class seeded_entropy final : public entropy {
-  public:
-    explicit seeded_entropy(std::uint64_t seed) : engine_(seed) {}
-    void fill(std::span<std::uint8_t> out) override {
-        std::ranges::generate(out, [this] { return static_cast<std::uint8_t>(engine_()); });
-    }
-
-  private:
-    std::mt19937_64 engine_;
-};
-
-signing_key key_from(std::uint8_t seed) {
-    secret_bytes whole{32};
-    std::ranges::fill(whole.span(), seed);
-    return signing_key{std::move(whole)};
-}
 
 // The rosters that come into force, made once.
 const std::vector<std::shared_ptr<const roster>>& rosters() {

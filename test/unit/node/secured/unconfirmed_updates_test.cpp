@@ -4,6 +4,7 @@
 #include "support/group_recorder.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"
+#include "support/told.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -15,20 +16,8 @@ namespace unconfirmed_updates {
 namespace {
 
 using namespace std::chrono_literals;
+using cles::test::numbers_feed;
 using cles::test::scripted_security;
-
-/// Records what a subscription on the link receives.
-class listener final : public cles::core::subscription {
-  public:
-    using subscription::subscription;
-    std::string heard;
-
-  private:
-    bool on_event(const cles::detail::raw_event& event, cles::core::feed_mailbox::hand_over) override {
-        heard += event.kind == cles::feed_event::gap ? "gap " : std::to_string(event.seq) + " ";
-        return true;
-    }
-};
 
 struct fixture {
     fixture() {
@@ -59,7 +48,7 @@ struct fixture {
     std::shared_ptr<scripted_security> security = std::make_shared<scripted_security>();
     cles::test::test_node node{{}, {}, {}, {}, security};
     cles::test::test_link link{node, "car2"};
-    listener feed{"car3", "pose", false, 8};
+    numbers_feed feed{"car3", "pose", false, 8};
 };
 
 const std::string now_running = "0000000b";
@@ -141,7 +130,7 @@ BOOST_AUTO_TEST_CASE(without_a_valid_reply_they_are_dropped) {
 }
 
 BOOST_AUTO_TEST_CASE(the_peers_own_are_confirmed_by_the_link) {
-    listener own{"car2", "pose", false, 8};
+    numbers_feed own{"car2", "pose", false, 8};
     link.session().bound().add(own);
     BOOST_TEST(link.ask(update(1, now_running, "car2")).empty());
     BOOST_TEST(own.heard == "1 ");
@@ -159,7 +148,7 @@ BOOST_AUTO_TEST_CASE(they_are_bounded) {
     BOOST_TEST(node.counts().updates_dropped == 5U);
     const std::string large(cles::core::unconfirmed_updates::max_bytes, 'x');
     cles::test::test_link other{node, "car2"};
-    listener second{"car3", "pose", false, 8};
+    numbers_feed second{"car3", "pose", false, 8};
     other.session().bound().add(second);
     other.ask("UPDATE car3:pose seq=1 epoch=" + now_running + " {\"x\":\"" + large + "\"}");
     BOOST_TEST(node.counts().updates_dropped == 6U);
@@ -168,7 +157,7 @@ BOOST_AUTO_TEST_CASE(they_are_bounded) {
 BOOST_AUTO_TEST_CASE(a_link_that_ends_takes_them_along) {
     {
         cles::test::test_link other{node, "car2"};
-        listener second{"car3", "pose", false, 8};
+        numbers_feed second{"car3", "pose", false, 8};
         other.session().bound().add(second);
         BOOST_TEST(is_question(other.ask(update(1, now_running))));
         other.reset();
@@ -180,7 +169,7 @@ BOOST_AUTO_TEST_CASE(a_link_that_ends_takes_them_along) {
 BOOST_AUTO_TEST_CASE(without_security_nothing_is_held) {
     cles::test::test_node open;
     cles::test::test_link to{open};
-    listener heard{"car3", "pose", false, 8};
+    numbers_feed heard{"car3", "pose", false, 8};
     to.session().bound().add(heard);
     BOOST_TEST(to.ask(update(1, now_running)).empty());
     BOOST_TEST(heard.heard == "1 ");

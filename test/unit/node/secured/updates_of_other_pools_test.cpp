@@ -5,6 +5,7 @@
 #include "support/group_recorder.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"
+#include "support/told.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -20,22 +21,11 @@ namespace updates_of_other_pools {
 namespace {
 
 using namespace std::chrono_literals;
+using cles::test::numbers_feed;
 using cles::test::scripted_security;
 
 const std::string now_running = "0000000b";
 const std::string later_running = "0000000c";
-
-class listener final : public cles::core::subscription {
-  public:
-    using subscription::subscription;
-    std::string heard;
-
-  private:
-    bool on_event(const cles::detail::raw_event& event, cles::core::feed_mailbox::hand_over) override {
-        heard += event.kind == cles::feed_event::gap ? "gap " : std::to_string(event.seq) + " ";
-        return true;
-    }
-};
 
 /// The link of car1 to the pool north.
 class link_to_pool final : public cles::test::recording_line_sink, public cles::core::subscriber {
@@ -89,7 +79,7 @@ struct fixture {
     std::shared_ptr<scripted_security> security = std::make_shared<scripted_security>();
     cles::test::test_node node{{}, {}, {}, {}, security};
     link_to_pool link{node};
-    listener feed{"north.car3", "control", false, 8};
+    numbers_feed feed{"north.car3", "control", false, 8};
 };
 
 const std::string control = R"("control")";
@@ -177,7 +167,7 @@ BOOST_AUTO_TEST_CASE(one_that_signs_no_more_is_heard_after_its_restart) {
 }
 
 BOOST_AUTO_TEST_CASE(a_name_without_the_pool_is_asked_for_as_it_is) {
-    listener plain{"car3", "control", false, 8};
+    numbers_feed plain{"car3", "control", false, 8};
     link.session().bound().add(plain);
     const auto sent = link.ask(update(1, now_running, {}, "car3"));
     BOOST_TEST(sent.starts_with("PULL car3:cles/announced/"), sent);
