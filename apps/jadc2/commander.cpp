@@ -17,10 +17,10 @@ std::string fate_of(const cles::error& why) {
     return not_begun ? "refused" : "failed";
 }
 
-std::optional<fmv::track> commander::select_target(int frames) const {
+std::optional<fmv::track> commander::select_target(double seconds) const {
     std::optional<fmv::track> best;
     for (const auto& t : latest_.tracks) {
-        const bool fits = t.age >= frames && t.missed == 0 && !struck_.contains({latest_.by, t.id});
+        const bool fits = t.age >= seconds && t.missed == 0 && !struck_.contains({latest_.by, t.id});
         if (fits && (!best || t.age > best->age)) {
             best = t;
         }

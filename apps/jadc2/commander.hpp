@@ -36,8 +36,9 @@ class commander {
     void set_picture(picture what) { latest_ = std::move(what); }
     [[nodiscard]] const picture& latest() const noexcept { return latest_; }
 
-    /// The scripted operator: the oldest target that has been followed for `frames`, is in sight, and has no order yet.
-    [[nodiscard]] std::optional<fmv::track> select_target(int frames) const;
+    /// The scripted operator: the oldest target that has been followed for so many seconds, is in sight, and has no
+    /// order yet.
+    [[nodiscard]] std::optional<fmv::track> select_target(double seconds) const;
     /// The target with that number in the newest picture.
     [[nodiscard]] std::optional<fmv::track> find(std::uint64_t id) const;
 

@@ -5,6 +5,7 @@
 
 #include "client/member_key.hpp"
 #include "events.hpp"
+#include "geo/traffic.hpp"
 #include "strike/order.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -53,10 +54,12 @@ boost::asio::awaitable<void> give_orders(cles::service& from, const drill_option
     auto next = steady::now();
     for (std::uint64_t i = 0; i < args.count + warm_up; ++i) {
         const strike::order what{.id = run + std::to_string(i),
-                                 .x = 160,
-                                 .y = 120,
-                                 .vx = 20,
-                                 .vy = -10,
+                                 .lat = geo::traffic::origin.lat,
+                                 .lon = geo::traffic::origin.lon,
+                                 .ve = 12,
+                                 .vn = -6,
+                                 .sigma = 3,
+                                 .sigma_v = 1,
                                  .utc = utc_now(),
                                  .deadline_ms = deadline_ms,
                                  .drill = true};

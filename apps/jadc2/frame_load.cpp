@@ -5,7 +5,7 @@
 
 #include "client/member_key.hpp"
 #include "events.hpp"
-#include "fmv/base64.hpp"
+#include "fmv/frame_codec.hpp"
 #include "fmv/messages.hpp"
 #include "scene.hpp"
 
@@ -24,11 +24,13 @@ namespace {
 using steady = std::chrono::steady_clock;
 
 constexpr std::uint64_t deadline_ms = 10'000;
+constexpr double fps = 25;           ///< of the times in the frames
 constexpr std::size_t pictures = 50; ///< sent repeatedly, because only the load matters
 
 struct work {
     const load_options& args;
-    const std::vector<std::string>& pixels;
+    const scene& ground;
+    const std::vector<std::string>& pictures_sent;
     cles::service& from;
     steady::time_point until{};
     std::uint64_t ended = 0, answered = 0, done = 0;
@@ -41,10 +43,13 @@ boost::asio::awaitable<void> send_stream(work& all, std::string stream) {
     for (std::uint64_t number = 0; steady::now() < all.until; ++number) {
         const fmv::frame_message what{.stream = stream,
                                       .frame = number,
+                                      .utc = static_cast<double>(number) / fps,
                                       .width = scene::size.width,
                                       .height = scene::size.height,
                                       .deadline_ms = deadline_ms,
-                                      .pixels = all.pixels[number % pictures]};
+                                      .camera = all.ground.reported(static_cast<double>(number % pictures) / fps),
+                                      .format = all.args.format,
+                                      .picture = all.pictures_sent[number % pictures]};
         const auto seen = co_await all.from.async_delegate<fmv::found>("self:FMV_Processing", what, options);
         ++all.done;
         all.run_ms += seen.run_ms;
@@ -65,15 +70,17 @@ BOOST_DESCRIBE_STRUCT(summary, (), (frames, frames_a_second, mean_run_ms))
 
 int run_load(const load_options& args) {
     const scene ground{args.seed};
-    std::vector<std::string> pixels;
+    std::vector<std::string> sent;
     for (std::uint64_t number = 0; number < pictures; ++number) {
-        pixels.push_back(fmv::to_base64(ground.frame(number)));
+        const auto frame = ground.frame(number, static_cast<double>(number) / fps);
+        sent.push_back(fmv::encode(frame, scene::size, args.format));
     }
     boost::asio::io_context io{1};
     cles::service node{io, tool::options_of_member("load", args.keys)};
     const auto begun = steady::now();
     work all{.args = args,
-             .pixels = pixels,
+             .ground = ground,
+             .pictures_sent = sent,
              .from = node,
              .until = args.duration_s > 0 ? begun + std::chrono::duration_cast<steady::duration>(
                                                         std::chrono::duration<double>{args.duration_s})

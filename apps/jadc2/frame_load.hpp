@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "fmv/frame_codec.hpp"
+
 #include <cstdint>
 #include <string>
 
@@ -11,6 +13,7 @@ struct load_options {
     std::uint64_t streams = 4; ///< each with one frame in flight at any time
     double duration_s = 5;     ///< 0: until it is stopped
     std::uint64_t seed = 1;
+    std::string format = fmv::default_format();
     std::string keys{}; ///< the directory with the key of a member; empty: without security
 };
 

@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "client/member_key.hpp"
 #include "drill.hpp"
+#include "fmv/frame_codec.hpp"
 #include "frame_load.hpp"
 #include "mission.hpp"
 #include "options/keys_option.hpp"
 #include "output/errors.hpp"
 #include "recon.hpp"
+#include "rehearsal.hpp"
 
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace {
 
@@ -89,6 +92,12 @@ Options sealed(const CLI::App& command, Options args, const std::string& keys) {
     return args;
 }
 
+void add_format(CLI::App& command, std::string& format) {
+    command.add_option("--format", format, "Of frames: jpeg (the default, if built with libjpeg-turbo) or grey")
+        ->check(CLI::IsMember(fmv::has_jpeg() ? std::vector<std::string>{"grey", "jpeg"}
+                                              : std::vector<std::string>{"grey"}));
+}
+
 CLI::App* add_recon(CLI::App& app, jadc2::recon_options& args) {
     auto* r =
         app.add_subcommand("recon", "The reconnaissance aircraft: films, delegates the processing, publishes tracks");
@@ -102,6 +111,7 @@ CLI::App* add_recon(CLI::App& app, jadc2::recon_options& args) {
     r->add_option("-s,--satellite", args.satellites, "A node that processes video (tcp://127.0.0.1:25370)")
         ->type_name("URL");
     r->add_option("--seed", args.seed, "Seed of the scene (1)");
+    add_format(*r, args.format);
     r->add_option("--fps", args.fps, "Frames per second (25)")->check(CLI::Range(0.1, 200.0));
     r->add_option("--frames", args.frames, "Frames after which it ends; 0: no limit (0)");
     r->add_option("--deadline", args.deadline_ms, "Deadline of a frame in milliseconds (1000)")
@@ -117,8 +127,10 @@ CLI::App* add_mission(CLI::App& app, jadc2::mission_options& args) {
     m->add_option("-r,--recon", args.recon, "Its address (tcp://127.0.0.1:25373)")->type_name("URL");
     m->add_option("-s,--strike", args.strikers, "A node that strikes (tcp://127.0.0.1:25374)")->type_name("URL");
     m->add_option("--strikes", args.strikes, "Strikes after which it ends (1)")->check(CLI::Range(1, 1000));
-    m->add_option("--age", args.age, "Frames for which a target is followed before it is struck (15)")
-        ->check(CLI::Range(1, 100'000));
+    m->add_option("--age", args.age_s, "Seconds for which a target is followed before it is struck (0.6)")
+        ->check(CLI::Range(0.0, 3600.0));
+    m->add_option("--every", args.every_ms, "The minimum interval between pictures of the tracks in milliseconds (250)")
+        ->check(CLI::Range(0, 60'000));
     m->add_flag("--operator", args.has_operator, "Let an operator at the terminal decide");
     m->add_option("--duration", args.duration_s, "Seconds after which it ends in any case; 0: no limit (0)")
         ->check(CLI::Range(0.0, 86'400.0));
@@ -136,12 +148,23 @@ CLI::App* add_drill(CLI::App& app, jadc2::drill_options& args) {
     return d;
 }
 
+CLI::App* add_rehearse(CLI::App& app, jadc2::rehearsal_options& args) {
+    auto* r = app.add_subcommand("rehearse", "Measures how many strikes hit, in simulated time and without a network");
+    r->add_option("-n,--strikes", args.strikes, "Strikes (100)")->check(CLI::Range(1, 100'000));
+    r->add_option("--seed", args.seed, "Seed of the first scene (1)");
+    r->add_option("--scans", args.scans, "Scans of the strike aircraft's sensor that are fused with the track (30)")
+        ->check(CLI::Range(0, 100));
+    r->add_option("--delay", args.delay_s, "Seconds from the frame to the release (0.3)")->check(CLI::Range(0.0, 60.0));
+    return r;
+}
+
 CLI::App* add_load(CLI::App& app, jadc2::load_options& args) {
     auto* l = app.add_subcommand("load", "Sends frames to a node as fast as it answers");
     l->add_option("--at", args.at, "Address of the node (tcp://127.0.0.1:25370)")->type_name("URL");
     l->add_option("--streams", args.streams, "Number of parallel streams (4)")->check(CLI::Range(1, 64));
     l->add_option("--duration", args.duration_s, "Seconds; 0: until it is stopped (5)")->check(CLI::Range(0.0, 3600.0));
     l->add_option("--seed", args.seed, "Seed of the scene (1)");
+    add_format(*l, args.format);
     return l;
 }
 
@@ -152,25 +175,30 @@ int main(int argc, char** argv) {
     jadc2::mission_options mission;
     jadc2::drill_options drill;
     jadc2::load_options load;
+    jadc2::rehearsal_options rehearsal;
     CLI::App app{"Joint command: a reconnaissance aircraft and a mission centre.", "cles-jadc2"};
     app.require_subcommand(1);
     const auto* as_recon = add_recon(app, recon);
     const auto* as_mission = add_mission(app, mission);
     const auto* as_drill = add_drill(app, drill);
     const auto* as_load = add_load(app, load);
+    const auto* as_rehearse = add_rehearse(app, rehearsal);
     tool::keys_option keys;
     for (auto* command : app.get_subcommands({})) {
-        keys.add_optional_to(*command, keys_help);
+        if (command != as_rehearse) {
+            keys.add_optional_to(*command, keys_help);
+        }
     }
     app.footer("With --keys, default addresses begin with tls:// instead of tcp://.\n\nExit codes: 0 ok, 2 usage, 3 no "
                "node or no task, 4 deadline or unknown result, 5 another error, 6 busy.");
     try {
         app.parse(argc, argv);
         const auto directory = keys.given_directory();
-        return as_recon->parsed()     ? run_recon(*as_recon, recon, directory)
-               : as_mission->parsed() ? run_mission(*as_mission, mission, directory)
-               : as_drill->parsed()   ? jadc2::drill(sealed(*as_drill, drill, directory))
-                                      : jadc2::run_load(sealed(*as_load, load, directory));
+        return as_recon->parsed()      ? run_recon(*as_recon, recon, directory)
+               : as_mission->parsed()  ? run_mission(*as_mission, mission, directory)
+               : as_rehearse->parsed() ? jadc2::print_rehearsal(rehearsal)
+               : as_drill->parsed()    ? jadc2::drill(sealed(*as_drill, drill, directory))
+                                       : jadc2::run_load(sealed(*as_load, load, directory));
     } catch (const CLI::ParseError& error) { // or --help
         return app.exit(error) == 0 ? 0 : 2;
     } catch (const tool::usage_error& e) {

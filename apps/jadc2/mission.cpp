@@ -11,7 +11,9 @@
 
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -28,6 +30,12 @@ cles::service_options options_of(const mission_options& args) {
     out.gossip = cles::gossip(args.strikers);
     out.routing = cles::routing();
     return out;
+}
+
+// Degrees, clockwise from north.
+double course_of(const fmv::track& target) {
+    const double course = std::atan2(target.ve, target.vn) * 180 / std::numbers::pi;
+    return course < 0 ? course + 360 : course;
 }
 
 } // namespace
@@ -85,7 +93,8 @@ boost::asio::awaitable<void> mission::watch() {
     while (!ending_) {
         std::optional<cles::error> failure;
         try {
-            auto tracks = co_await node_.async_bind<picture>(noun, cles::bind_options{}.keep(4));
+            auto tracks = co_await node_.async_bind<picture>(
+                noun, cles::bind_options{}.keep(1).every(milliseconds{args_.every_ms}));
             error_.clear();
             events_.log("bound", "bound to the tracks of " + args_.recon_name);
             co_await follow(std::move(tracks));
@@ -131,7 +140,7 @@ void mission::see(picture what) {
     commander_.set_picture(std::move(what));
     if (args_.has_operator) {
         show();
-    } else if (const auto target = commander_.select_target(args_.age);
+    } else if (const auto target = commander_.select_target(args_.age_s);
                target && commander_.fates().given < args_.strikes) {
         decide(*target);
     }
@@ -148,10 +157,12 @@ void mission::decide(const fmv::track& target) {
     auto record = begin_story(seen, target, received_utc_, utc_now());
     record.order = args_.name + "-" + run_ + "-" + std::to_string(commander_.fates().given + 1);
     const strike::order what{.id = record.order,
-                             .x = target.x,
-                             .y = target.y,
-                             .vx = target.vx,
-                             .vy = target.vy,
+                             .lat = target.lat,
+                             .lon = target.lon,
+                             .ve = target.ve,
+                             .vn = target.vn,
+                             .sigma = target.sigma,
+                             .sigma_v = target.sigma_v,
                              .utc = seen.captured,
                              .deadline_ms = args_.deadline_ms};
     commander_.ordered(target);
@@ -188,19 +199,26 @@ boost::asio::awaitable<void> mission::give(strike::order what, story record) {
     }
     tell(record);
     if (record.fate == "done" && !ending_) {
-        co_await assess(record.outcome);
+        co_await assess(record);
     }
     end_if_done();
 }
 
-boost::asio::awaitable<void> mission::assess(strike::outcome what) {
-    const impact where{.x = what.aim_x, .y = what.aim_y, .utc = what.impact_utc};
+boost::asio::awaitable<void> mission::assess(story record) {
+    const auto& what = record.outcome;
+    const impact where{.by = record.processed_by,
+                       .target = record.target,
+                       .lat = what.aim_lat,
+                       .lon = what.aim_lon,
+                       .utc = what.impact_utc};
     const auto noun = args_.recon_name + ":impact";
     try {
         const auto seen = co_await node_.async_push<assessment>(noun, where);
         events_.log("assessed",
                     "order " + what.order + (seen.hit ? " hits" : " misses") + ": " + fixed(seen.missed_by, 1) +
-                        " pixels from the target, " + fixed(what.flight_s, 2) + " s after its release",
+                        " m from the " + (seen.is_target ? "target" : "nearest vehicle") + ", " +
+                        fixed(what.flight_s, 2) + " s after its release; " + std::to_string(what.plots) + " plots of " +
+                        what.node + " were fused with the track",
                     seen);
     } catch (const cles::error& e) {
         events_.log("assessed", "order " + what.order + ": not seen: " + e.what());
@@ -225,9 +243,9 @@ void mission::show() {
     const auto& seen = commander_.latest();
     std::string text = std::to_string(seen.tracks.size()) + " targets";
     for (const auto& t : seen.tracks) {
-        text += "\n    " + std::to_string(t.id) + "  at " + fixed(t.x, 0) + ", " + fixed(t.y, 0) + ", moving " +
-                fixed(t.vx, 0) + ", " + fixed(t.vy, 0) + " pixels per second, followed for " + std::to_string(t.age) +
-                " frames";
+        text += "\n    " + std::to_string(t.id) + "  at " + fixed(t.lat, 5) + ", " + fixed(t.lon, 5) + " to " +
+                fixed(t.sigma, 1) + " m, " + fixed(std::hypot(t.ve, t.vn), 0) + " m/s towards " +
+                fixed(course_of(t), 0) + " degrees, followed for " + fixed(t.age, 1) + " s";
     }
     events_.log("picture", text + "\n    strike NUMBER, or quit:", seen);
 }

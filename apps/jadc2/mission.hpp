@@ -25,10 +25,11 @@ struct mission_options {
     std::string recon_name = "recon";
     std::string recon = "tcp://127.0.0.1:25373";
     std::vector<std::string> strikers{"tcp://127.0.0.1:25374"};
-    std::uint64_t strikes = 1; ///< number of strikes after which it ends
-    int age = 15; ///< frames for which a target must have been followed before the scripted operator strikes
-    bool has_operator = false; ///< an operator at the terminal decides
-    double duration_s = 0;     ///< after which it ends in any case; 0: no limit
+    std::uint64_t strikes = 1;    ///< number of strikes after which it ends
+    double age_s = 0.6;           ///< for which a target must have been followed before the scripted operator strikes
+    std::uint64_t every_ms = 250; ///< the minimum interval between pictures of the tracks
+    bool has_operator = false;    ///< an operator at the terminal decides
+    double duration_s = 0;        ///< after which it ends in any case; 0: no limit
     std::uint64_t deadline_ms = 3000;
     std::string keys{}; ///< the directory with its key; empty: without security
     bool json = false;
@@ -49,7 +50,7 @@ class mission {
     boost::asio::awaitable<void> read_orders();
     void tell(const story& record);
     boost::asio::awaitable<void> give(strike::order what, story record);
-    boost::asio::awaitable<void> assess(strike::outcome what);
+    boost::asio::awaitable<void> assess(story record);
     void see(picture what);
     void decide(const fmv::track& target);
     void run_command(std::string_view line);

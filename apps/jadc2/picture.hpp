@@ -5,8 +5,7 @@
 
 namespace jadc2 {
 
-/// What the reconnaissance aircraft publishes as `tracks`. Here places are pixels of the ground, velocities pixels per
-/// second, points in time seconds since 1970 by its clock.
+/// What the reconnaissance aircraft publishes as `tracks`. Points in time are seconds since 1970 by its clock.
 struct picture {
     std::string by{};      ///< the node that processed the frame; empty if there is none
     std::string trouble{}; ///< why there is none
@@ -23,18 +22,24 @@ struct picture {
 BOOST_DESCRIBE_STRUCT(picture, (),
                       (by, trouble, frame, ready, captured, published, encode_ms, way_ms, queue_ms, run_ms, tracks))
 
-/// PUSH recon:impact: where and when something struck. The answer says what is seen of it.
+/// PUSH recon:impact: where and when something struck, and what it was meant for. The answer says what is seen of it.
 struct impact {
-    double x = 0;
-    double y = 0;
+    std::string by{};         ///< the node that processed the frame with the track
+    std::uint64_t target = 0; ///< the track's number
+    double lat = 0;           ///< degrees, WGS 84
+    double lon = 0;
     double utc = 0;
 };
-BOOST_DESCRIBE_STRUCT(impact, (), (x, y, utc))
+BOOST_DESCRIBE_STRUCT(impact, (), (by, target, lat, lon, utc))
+
+/// The distance within which a weapon has an effect on a vehicle, m. The camera sees it as ten pixels.
+constexpr double effective_radius = 5;
 
 struct assessment {
-    double missed_by = 0; ///< pixels to the nearest vehicle's middle
-    bool hit = false;     ///< within its size
+    double missed_by = 0;   ///< m to the middle of the vehicle
+    bool hit = false;       ///< within `effective_radius`
+    bool is_target = false; ///< it is the vehicle of that track; else the nearest one, because the track is not known
 };
-BOOST_DESCRIBE_STRUCT(assessment, (), (missed_by, hit))
+BOOST_DESCRIBE_STRUCT(assessment, (), (missed_by, hit, is_target))
 
 } // namespace jadc2

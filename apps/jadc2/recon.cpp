@@ -2,7 +2,6 @@
 #include "recon.hpp"
 
 #include "client/member_key.hpp"
-#include "fmv/base64.hpp"
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -13,7 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
-#include <limits>
+#include <optional>
 
 namespace jadc2 {
 namespace {
@@ -22,7 +21,6 @@ using steady = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
 constexpr std::size_t max_times = 10'000;
-constexpr std::uint64_t settled = 10; ///< frames before tracks are scored
 
 double ms_since(steady::time_point begin) {
     return std::chrono::duration<double, std::milli>(steady::now() - begin).count();
@@ -52,9 +50,15 @@ struct summary {
     std::uint64_t judged = 0; ///< frames
     double recall = 0;
     double false_per_frame = 0;
+    double place_error = 0;    ///< m, per axis, root mean square
+    double velocity_error = 0; ///< m/s, the same
+    double frame_bytes = 0;    ///< of a frame as it is sent, mean
     medians median{};
 };
-BOOST_DESCRIBE_STRUCT(summary, (), (frames, judged, recall, false_per_frame, median))
+BOOST_DESCRIBE_STRUCT(summary, (),
+                      (frames, judged, recall, false_per_frame, place_error, velocity_error, frame_bytes, median))
+
+double microseconds(double ms) { return std::round(ms * 1000) / 1000; } // fewer digits make a message shorter
 
 double median_of(const std::vector<picture>& all, double picture::*member) {
     std::vector<double> values;
@@ -99,7 +103,6 @@ int recon::run() {
 
 boost::asio::awaitable<void> recon::film() {
     const auto begun = steady::now();
-    begun_utc_ = utc_now();
     for (std::uint64_t number = 0; args_.frames == 0 || number < args_.frames; ++number) {
         const std::chrono::duration<double> after{static_cast<double>(number) / args_.fps};
         pace_.expires_at(begun + std::chrono::duration_cast<steady::duration>(after));
@@ -122,25 +125,30 @@ boost::asio::awaitable<void> recon::film() {
 }
 
 boost::asio::awaitable<void> recon::process(std::uint64_t number) {
-    const auto pixels = scene_.frame(number);
     picture times{.frame = number, .captured = utc_now()};
     const auto begun = steady::now();
+    const auto pixels = scene_.frame(number, times.captured);
     const fmv::frame_message message{.stream = args_.name + "-" + run_ + "-" + std::to_string(episode_),
                                      .frame = number,
+                                     .utc = times.captured,
                                      .width = scene::size.width,
                                      .height = scene::size.height,
                                      .deadline_ms = args_.deadline_ms,
-                                     .pixels = fmv::to_base64(pixels)};
-    times.encode_ms = ms_since(begun);
+                                     .camera = scene_.reported(times.captured),
+                                     .format = args_.format,
+                                     .picture = fmv::encode(pixels, scene::size, args_.format)};
+    picture_bytes_ += message.picture.size();
+    const double encode_ms = ms_since(begun);
+    times.encode_ms = microseconds(encode_ms);
     const auto noun = fates_.target() + ":FMV_Processing";
     const auto options = cles::call_options{}.deadline(milliseconds{args_.deadline_ms});
     std::optional<cles::error> failure;
     try {
         const auto seen = co_await space_.async_delegate<fmv::found>(noun, message, options);
-        times.queue_ms = seen.queue_ms;
-        times.run_ms = seen.run_ms;
-        times.way_ms = ms_since(begun) - times.encode_ms - seen.queue_ms - seen.run_ms;
-        take(number, seen, std::move(times));
+        times.queue_ms = microseconds(seen.queue_ms);
+        times.run_ms = microseconds(seen.run_ms);
+        times.way_ms = microseconds(ms_since(begun) - encode_ms - seen.queue_ms - seen.run_ms);
+        take(seen, std::move(times));
     } catch (const cles::error& e) {
         failure = e;
     }
@@ -152,13 +160,13 @@ boost::asio::awaitable<void> recon::process(std::uint64_t number) {
     }
 }
 
-void recon::take(std::uint64_t number, const fmv::found& seen, picture times) {
+void recon::take(const fmv::found& seen, picture times) {
     if (std::exchange(fresh_, false)) {
-        first_ = number;
-        ready_frames_ = 0;
+        evaluation_.begin(times.frame, times.captured);
     }
     if (fates_.done(seen.node)) {
-        events_.log("processing", seen.node + " processes the video, from frame " + std::to_string(number) + " on");
+        events_.log("processing",
+                    seen.node + " processes the video, from frame " + std::to_string(times.frame) + " on");
     }
     times.by = seen.node;
     times.ready = seen.ready;
@@ -167,20 +175,8 @@ void recon::take(std::uint64_t number, const fmv::found& seen, picture times) {
     }
     times_.push_back(times);
 
-    // Tracks are in pixels of the first frame of the stream.
-    const auto from = scene_.camera(first_);
-    std::vector<fmv::point> places;
+    evaluation_.add(times.captured, seen.tracks, seen.ready);
     times.tracks = seen.tracks;
-    for (auto& t : times.tracks) {
-        t.x += from.x;
-        t.y += from.y;
-        t.vx *= args_.fps;
-        t.vy *= args_.fps;
-        places.push_back({t.x, t.y});
-    }
-    if (seen.ready && ++ready_frames_ > settled) {
-        score_.add(scene_.truth(static_cast<double>(number)), places);
-    }
     times.published = utc_now();
     ground_.update("tracks", times);
 }
@@ -215,28 +211,36 @@ std::string recon::explain(const cles::error& why) const {
 }
 
 assessment recon::assess(const impact& at) const {
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const auto& vehicle : scene_.truth((at.utc - begun_utc_) * args_.fps)) {
-        nearest = std::min(nearest, std::hypot(vehicle.x - at.x, vehicle.y - at.y));
+    const auto place = scene::plane().to_plane({.lat = at.lat, .lon = at.lon});
+    std::vector<double> distances;
+    for (const auto& vehicle : scene_.truth(at.utc)) {
+        distances.push_back(std::hypot(vehicle.at.east - place.east, vehicle.at.north - place.north));
     }
-    return {.missed_by = nearest, .hit = nearest <= score::near};
+    const auto target = at.by == fates_.target() ? evaluation_.vehicle_of(at.target) : std::nullopt;
+    const double missed_by = target ? distances[*target] : *std::min_element(distances.begin(), distances.end());
+    return {.missed_by = missed_by, .hit = missed_by <= effective_radius, .is_target = target.has_value()};
 }
 
 void recon::report() const {
     const auto& all = fates_.sums();
     const summary out{.frames = all,
-                      .judged = score_.sums().frames,
-                      .recall = score_.recall(),
-                      .false_per_frame = score_.false_per_frame(),
+                      .judged = evaluation_.found().sums().frames,
+                      .recall = evaluation_.found().recall(),
+                      .false_per_frame = evaluation_.found().false_per_frame(),
+                      .place_error = evaluation_.place_error(),
+                      .velocity_error = evaluation_.velocity_error(),
+                      .frame_bytes = static_cast<double>(picture_bytes_) /
+                                     static_cast<double>(std::max<std::uint64_t>(1, all.done + all.failed)),
                       .median = {.encode_ms = median_of(times_, &picture::encode_ms),
                                  .way_ms = median_of(times_, &picture::way_ms),
                                  .queue_ms = median_of(times_, &picture::queue_ms),
                                  .run_ms = median_of(times_, &picture::run_ms)}};
     std::string text = std::to_string(all.captured) + " frames: " + std::to_string(all.done) + " done, " +
                        std::to_string(all.failed) + " failed, " + std::to_string(all.skipped) + " skipped; ";
-    text += out.judged == 0
-                ? "no frames scored"
-                : "recall " + fixed(out.recall, 3) + ", " + fixed(out.false_per_frame, 3) + " false tracks a frame";
+    text += out.judged == 0 ? "no frames scored"
+                            : "recall " + fixed(out.recall, 3) + ", " + fixed(out.false_per_frame, 3) +
+                                  " false tracks a frame, off by " + fixed(out.place_error, 1) + " m and " +
+                                  fixed(out.velocity_error, 1) + " m/s";
     events_.log("report", text, out);
 }
 

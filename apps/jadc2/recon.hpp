@@ -4,10 +4,11 @@
 #include <cles/service.hpp>
 
 #include "events.hpp"
+#include "fmv/frame_codec.hpp"
 #include "frame_fates.hpp"
 #include "picture.hpp"
 #include "scene.hpp"
-#include "score.hpp"
+#include "track_evaluation.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -23,6 +24,7 @@ struct recon_options {
     bool insecure = false;
     std::vector<std::string> satellites{"tcp://127.0.0.1:25370"};
     std::uint64_t seed = 1;
+    std::string format = fmv::default_format(); ///< of frames
     double fps = 25;
     std::uint64_t frames = 0; ///< 0: until it is stopped
     std::uint64_t deadline_ms = 1000;
@@ -46,7 +48,7 @@ class recon {
   private:
     boost::asio::awaitable<void> film();
     boost::asio::awaitable<void> process(std::uint64_t number);
-    void take(std::uint64_t number, const fmv::found& seen, picture times);
+    void take(const fmv::found& seen, picture times);
     void report_error(const cles::error& why);
     [[nodiscard]] std::string explain(const cles::error& why) const;
     [[nodiscard]] assessment assess(const impact& at) const;
@@ -62,13 +64,11 @@ class recon {
     frame_fates fates_;
     std::string run_;           ///< unique
     std::uint64_t episode_ = 0; ///< of the video: each node has its own stream
-    std::uint64_t first_ = 0;   ///< frame of the episode
     bool fresh_ = true;         ///< no frame of the episode has been processed
-    score score_;
-    std::uint64_t ready_frames_ = 0; ///< of the episode, since its node knows the background
-    std::vector<picture> times_;     ///< the last ones, without tracks
-    double begun_utc_ = 0;           ///< of frame 0
-    double reported_utc_ = 0;        ///< of the last error
+    track_evaluation evaluation_{scene_};
+    std::vector<picture> times_;      ///< the last ones, without tracks
+    std::uint64_t picture_bytes_ = 0; ///< sent
+    double reported_utc_ = 0;         ///< of the last error
     bool ending_ = false;
 };
 

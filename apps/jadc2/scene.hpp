@@ -1,44 +1,52 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "fmv/image.hpp"
+#include "fmv/messages.hpp"
+#include "fmv/stream.hpp"
+#include "geo/traffic.hpp"
 
 #include <cstdint>
 #include <vector>
 
 namespace jadc2 {
 
-/// The ground and the frames of the camera: identical for a seed on every machine. Ground with a texture,
-/// some edges and vehicles that move, from a camera that shakes by fractions of pixels, with noise.
+/// The ground, and what the camera of a circling aircraft shows of it: determined by a seed and the time. Ground with a
+/// texture, some edges, and vehicles; from a camera that shakes, with noise.
 ///
-/// Places are pixels of the ground: pixel (x, y) of a frame shows the ground at (x, y) + `camera(frame)`.
+/// Positions are in metres from `geo::traffic::origin`, at which the camera points.
 class scene {
   public:
     static constexpr fmv::extent size{.width = 320, .height = 240};
-    static constexpr double noise = 4; ///< standard deviation, in grey levels
+    static constexpr double noise = 4;             ///< standard deviation, in grey levels
+    static constexpr double position_sigma = 1.5;  ///< m, of the aircraft's navigation, constant during a flight
+    static constexpr double pointing_sigma = 0.07; ///< degrees, of the camera's mount, constant during a flight
 
     explicit scene(std::uint64_t seed);
 
-    [[nodiscard]] fmv::grey frame(std::uint64_t number) const;
-    [[nodiscard]] fmv::point camera(std::uint64_t number) const;
-    /// Where the vehicles are; time is counted in frames. It is only for scoring.
-    [[nodiscard]] std::vector<fmv::point> truth(double time) const;
+    /// \param number of the frame, which determines noise and shaking \param utc s since 1970
+    [[nodiscard]] fmv::grey frame(std::uint64_t number, double utc) const;
+    /// Where the camera is and points in truth.
+    [[nodiscard]] geo::camera camera(std::uint64_t number, double utc) const;
+    /// What the aircraft knows of it.
+    [[nodiscard]] fmv::camera_message reported(double utc) const;
+    /// Where the vehicles are. It is only for scoring.
+    [[nodiscard]] std::vector<geo::traffic::motion> truth(double utc) const { return traffic_.at(utc); }
+
+    /// On which its positions are.
+    static const geo::tangent_plane& plane();
 
   private:
-    struct vehicle {
-        fmv::point start{}, velocity{}; ///< pixels per frame
-        double half_length = 0, half_width = 0;
-        double contrast = 0; ///< grey levels
-    };
-
+    [[nodiscard]] geo::camera nominal(double utc) const;
     void make_ground();
-    void make_vehicles();
-    void draw(const vehicle& v, fmv::point at, std::vector<float>& onto) const;
+    void draw(std::size_t vehicle, geo::plane_position at, const geo::projection& view, std::vector<float>& onto) const;
 
     std::uint64_t seed_;
-    std::vector<float> ground_; ///< with a margin on all sides
-    std::vector<vehicle> vehicles_;
-    std::vector<float> normal_; ///< a table of normally distributed numbers
+    geo::traffic traffic_;
+    std::vector<float> ground_;                       ///< grey levels of squares
+    std::vector<float> normal_;                       ///< a table of normally distributed numbers
+    double phase_ = 0;                                ///< of the circle that the aircraft flies, rad
+    double error_east_ = 0, error_north_ = 0;         ///< of the reported position, m
+    double error_azimuth_ = 0, error_depression_ = 0; ///< of the reported pointing, rad
 };
 
 } // namespace jadc2

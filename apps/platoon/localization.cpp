@@ -7,16 +7,16 @@
 namespace platoon {
 namespace {
 
-const tangent_plane plane{{.lat = 48.137, .lon = 11.575}};
+const geo::tangent_plane plane{{.lat = 48.137, .lon = 11.575}};
 constexpr double heading = 30 * std::numbers::pi / 180; // from north to east
 
 } // namespace
 
-geographic place_on_road(double x) {
+geo::geographic place_on_road(double x) {
     return plane.to_geographic({.east = x * std::sin(heading), .north = x * std::cos(heading)});
 }
 
-double distance_on_road(const geographic& place) {
+double distance_on_road(const geo::geographic& place) {
     const auto at = plane.to_plane(place);
     return at.east * std::sin(heading) + at.north * std::cos(heading);
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "geo/tangent_plane.hpp"
 #include "state.hpp"
-#include "tangent_plane.hpp"
 
 #include <boost/describe/class.hpp>
 
@@ -28,8 +28,8 @@ BOOST_DESCRIBE_STRUCT(localization, (),
                       (mode, ahead, lead, admits, behind, utc, lat, lon, v, a, u, j, lag, brake, sent_ns))
 
 /// The road: a straight line on the plane, which all vehicles know as their map.
-geographic place_on_road(double x);
-double distance_on_road(const geographic& place);
+geo::geographic place_on_road(double x);
+double distance_on_road(const geo::geographic& place);
 
 /// \param start_utc UTC at the local time 0 of the sender
 localization to_localization(const state& of, double start_utc);

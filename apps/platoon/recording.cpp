@@ -25,7 +25,7 @@ constexpr double budget_us = 100'000;
 } // namespace
 
 void extend(course& of, const motion& where, double distance, double spacing) {
-    const auto place = std::isnan(where.x) ? geographic{.lat = NAN, .lon = NAN} : place_on_road(where.x);
+    const auto place = std::isnan(where.x) ? geo::geographic{.lat = NAN, .lon = NAN} : place_on_road(where.x);
     of.speed.push_back(where.v);
     of.error.push_back(distance - spacing);
     of.distance.push_back(distance);

@@ -12,7 +12,27 @@ constexpr float slow_pace = 1.0F / 256;
 
 } // namespace
 
-background::background(extent size) : size_(size) {}
+background::background(extent size) : size_(size), shown_(size.pixels()) {}
+
+void background::complete(grey& aligned, const grey& seen) {
+    if (reference_.empty()) {
+        reference_ = aligned;
+    }
+    for (std::size_t i = 0; i < aligned.size(); ++i) {
+        if (seen[i] == 0) {
+            aligned[i] = reference_[i];
+        } else if (shown_[i] == 0) {
+            shown_[i] = 1;
+            reference_[i] = aligned[i];
+            for (auto& frame : kept_) {
+                frame[i] = aligned[i];
+            }
+            if (known()) {
+                values_[i] = aligned[i];
+            }
+        }
+    }
+}
 
 void background::learn(const grey& aligned) {
     if (seen_ == 0) {

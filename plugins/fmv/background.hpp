@@ -22,6 +22,9 @@ class background {
     /// The first frame, with which the others are to be aligned until the background is known.
     [[nodiscard]] const grey& reference() const noexcept { return reference_; }
     [[nodiscard]] bool known() const noexcept { return seen_ >= learning; }
+    /// Completes a frame with the background where it did not show the ground, so that nothing differs there. What it
+    /// shows for the first time is background at first.
+    void complete(grey& aligned, const grey& seen);
     /// A frame to learn from, aligned. \pre not known
     void learn(const grey& aligned);
     /// Follows an aligned frame; `moving` is not 0 where something has been detected. \pre known
@@ -35,6 +38,7 @@ class background {
     extent size_;
     int seen_ = 0;
     grey reference_;
+    grey shown_; ///< not 0 where a frame has shown the ground
     std::vector<grey> kept_;
     std::vector<float> values_;
 };

@@ -63,4 +63,9 @@ std::optional<std::vector<std::uint8_t>> from_base64(std::string_view text, std:
     return seen < 64 ? std::optional{std::move(bytes)} : std::nullopt;
 }
 
+std::size_t base64_size(std::string_view text) noexcept {
+    const std::size_t padding = text.ends_with("==") ? 2 : text.ends_with('=') ? 1 : 0;
+    return text.size() < 4 ? 0 : text.size() / 4 * 3 - padding;
+}
+
 } // namespace fmv

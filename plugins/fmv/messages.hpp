@@ -9,29 +9,46 @@
 
 namespace fmv {
 
+/// Where a camera was and where it pointed, as far as its aircraft knows.
+struct camera_message {
+    double lat = 0, lon = 0;   ///< degrees, WGS 84
+    double height = 0;         ///< m above the ground, which is flat
+    double azimuth = 0;        ///< degrees, of the optical axis, clockwise from north
+    double depression = 0;     ///< degrees, of the optical axis, below the horizon
+    double field_of_view = 0;  ///< degrees, over the width of the picture
+    double position_sigma = 0; ///< m, standard deviation of its position, per axis
+    double pointing_sigma = 0; ///< degrees, the same of the direction of the optical axis
+};
+BOOST_DESCRIBE_STRUCT(camera_message, (),
+                      (lat, lon, height, azimuth, depression, field_of_view, position_sigma, pointing_sigma))
+
 /// A frame of a stream, as `FMV_Processing` takes it.
 struct frame_message {
     std::string stream{};    ///< whose frames belong together
     std::uint64_t frame = 0; ///< counted from the stream's first; some may be missing
+    double utc = 0;          ///< when it was taken, in seconds since 1970
     int width = 0;           ///< pixels
     int height = 0;
     std::uint64_t deadline_ms = 0; ///< as in the request: the waiting time is this minus the time left when work begins
-    std::string pixels{};          ///< a byte each, from black to white, row by row, in base64
+    camera_message camera{};
+    std::string format{}; ///< of the picture: `grey`, a byte for each pixel, from black to white, row by row; or `jpeg`
+    std::string picture{}; ///< in base64
 };
-BOOST_DESCRIBE_STRUCT(frame_message, (), (stream, frame, width, height, deadline_ms, pixels))
+BOOST_DESCRIBE_STRUCT(frame_message, (), (stream, frame, utc, width, height, deadline_ms, camera, format, picture))
 
-/// A target that is followed. What comes from `FMV_Processing` has pixels of the stream's first frame, and pixels per
-/// frame.
+/// A target that is followed, at the time of the frame.
 struct track {
     std::uint64_t id = 0; ///< of its stream, at its node
-    double x = 0;
-    double y = 0;
-    double vx = 0;
-    double vy = 0;
-    int age = 0;    ///< frames since it was first seen
-    int missed = 0; ///< frames since it was last seen; it is where it is predicted to be
+    double lat = 0;       ///< degrees, WGS 84
+    double lon = 0;
+    double ve = 0;      ///< m/s, to the east
+    double vn = 0;      ///< m/s, to the north
+    double sigma = 0;   ///< m, standard deviation of the place, per axis
+    double sigma_v = 0; ///< m/s, the same of the velocity
+    double age = 0;     ///< s since it was first seen
+    int missed = 0;     ///< frames since it was last seen; it is where it is predicted to be
 };
-BOOST_DESCRIBE_STRUCT(track, (), (id, x, y, vx, vy, age, missed))
+BOOST_DESCRIBE_STRUCT(track, (), (id, lat, lon, ve, vn, sigma, sigma_v, age, missed))
 
 /// What was found in a frame.
 struct found {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "registration.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <limits>
 
@@ -9,21 +10,39 @@ namespace {
 
 constexpr int grid = 5;
 
-std::int64_t difference(const grey& reference, const grey& picture, extent size, shift by) {
+double difference(const grey& reference, const rectified& picture, extent size, shift by) {
     std::int64_t sum = 0;
+    std::int64_t count = 0;
     for (int y = most_shift; y < size.height - most_shift; y += grid) {
         for (int x = most_shift; x < size.width - most_shift; x += grid) {
-            sum += std::abs(picture[size.at(x, y)] - reference[size.at(x + by.dx, y + by.dy)]);
+            const auto i = size.at(x, y);
+            const int d = picture.pixels[i] - reference[size.at(x + by.dx, y + by.dy)];
+            sum += picture.seen[i] != 0 ? std::abs(d) : 0;
+            count += picture.seen[i];
         }
     }
-    return sum;
+    return static_cast<double>(sum) / static_cast<double>(std::max<std::int64_t>(count, 1));
+}
+
+grey moved(const grey& from, extent size, shift by) {
+    grey out(size.pixels());
+    for (int y = 0; y < size.height; ++y) {
+        for (int x = 0; x < size.width; ++x) {
+            const int to_x = x + by.dx;
+            const int to_y = y + by.dy;
+            if (to_x >= 0 && to_y >= 0 && to_x < size.width && to_y < size.height) {
+                out[size.at(to_x, to_y)] = from[size.at(x, y)];
+            }
+        }
+    }
+    return out;
 }
 
 } // namespace
 
-shift register_with(const grey& reference, const grey& picture, extent size) {
+shift register_with(const grey& reference, const rectified& picture, extent size) {
     shift best;
-    auto least = std::numeric_limits<std::int64_t>::max();
+    auto least = std::numeric_limits<double>::infinity();
     for (int dy = -most_shift; dy <= most_shift; ++dy) {
         for (int dx = -most_shift; dx <= most_shift; ++dx) {
             if (const auto d = difference(reference, picture, size, {dx, dy}); d < least) {
@@ -35,21 +54,10 @@ shift register_with(const grey& reference, const grey& picture, extent size) {
     return best;
 }
 
-void align(const grey& reference, grey& picture, extent size, shift by) {
-    if (by == shift{}) {
-        return;
+void align(rectified& picture, extent size, shift by) {
+    if (by != shift{}) {
+        picture = {.pixels = moved(picture.pixels, size, by), .seen = moved(picture.seen, size, by)};
     }
-    grey moved = reference;
-    for (int y = 0; y < size.height; ++y) {
-        for (int x = 0; x < size.width; ++x) {
-            const int to_x = x + by.dx;
-            const int to_y = y + by.dy;
-            if (to_x >= 0 && to_y >= 0 && to_x < size.width && to_y < size.height) {
-                moved[size.at(to_x, to_y)] = picture[size.at(x, y)];
-            }
-        }
-    }
-    picture.swap(moved);
 }
 
 } // namespace fmv

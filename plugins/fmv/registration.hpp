@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "image.hpp"
+#include "ground_grid.hpp"
 
 namespace fmv {
 
-/// How far the camera has moved since the reference was taken, in whole pixels: pixel (x, y) of the picture shows what
-/// the reference has at (x + dx, y + dy).
+/// How far a picture is from the reference, because the camera pointed elsewhere than it reports, in whole pixels:
+/// pixel (x, y) of the picture shows what the reference has at (x + dx, y + dy).
 struct shift {
     int dx = 0;
     int dy = 0;
@@ -14,15 +14,15 @@ struct shift {
     bool operator==(const shift&) const = default;
 };
 
-/// The camera shakes by this much at most, in each direction.
+/// A picture is off by this much at most, in each direction.
 constexpr int most_shift = 4;
 
-/// The shift for which picture and reference differ the least, by the sum of absolute differences over a grid of
-/// pixels. Moving objects have little effect, because they are small compared with the background.
-shift register_with(const grey& reference, const grey& picture, extent size);
+/// The shift for which picture and reference differ the least, by the mean of absolute differences over a grid of
+/// pixels that the picture shows. Moving objects have little effect, because they are small compared with the
+/// background.
+shift register_with(const grey& reference, const rectified& picture, extent size);
 
-/// The picture as the camera would have taken it from where the reference was. Pixels outside the picture are taken
-/// from the reference, so that they show no change.
-void align(const grey& reference, grey& picture, extent size, shift by);
+/// Moves a picture by that shift. What moves in from outside has not been seen.
+void align(rectified& picture, extent size, shift by);
 
 } // namespace fmv

@@ -3,31 +3,54 @@
 
 #include "background.hpp"
 #include "detector.hpp"
+#include "ground_grid.hpp"
+#include "messages.hpp"
 #include "registration.hpp"
 #include "tracker.hpp"
 
+#include <optional>
+
 namespace fmv {
 
-/// One camera's video, frame by frame: aligned with the first frame and compared with the background; targets are
-/// tracked over time.
+/// The camera on a plane, whose origin is below it.
+geo::camera to_camera(const camera_message& what, extent size, const geo::tangent_plane& plane);
+
+/// One camera's video, frame by frame: mapped on the ground, aligned with the first frame and compared with the
+/// background; targets are tracked over time.
+///
+/// What the camera reports wrongly about its position and direction moves all places alike: alignment makes the error
+/// of the first frame that of all, so it remains the same.
 class stream {
   public:
     explicit stream(extent size) : size_(size), still_(size), detector_(size) {}
 
     [[nodiscard]] extent size() const noexcept { return size_; }
-    /// The next frame, `frames` after the last one received. Targets are reported in the coordinates of the first
-    /// frame.
-    void take(grey frame, int frames = 1);
+    /// When the last frame was taken.
+    [[nodiscard]] std::optional<double> utc() const noexcept { return utc_; }
+    /// The next frame. \pre it was taken later than the last one, and the middle of it shows the ground
+    void take(const grey& frame, const camera_message& from, double utc);
     /// Whether the background is known; until then nothing is detected.
     [[nodiscard]] bool ready() const noexcept { return still_.known(); }
-    [[nodiscard]] std::vector<tracked> targets() const { return tracker_.confirmed(); }
+    /// The confirmed targets on the ground, at the time of the last frame.
+    [[nodiscard]] std::vector<track> tracks() const;
 
   private:
+    struct map {
+        geo::tangent_plane plane;
+        ground_grid grid;
+        double deviation = 0; ///< of a place, m
+    };
+
+    void begin(const camera_message& first);
+
     extent size_;
+    std::optional<map> map_;
+    std::optional<double> utc_;
+    double interval_ = 0; ///< between the last two frames, s
+    point correction_{};  ///< of what the camera reports now, in squares
     background still_;
     detector detector_;
     tracker tracker_;
-    bool begun_ = false;
 };
 
 } // namespace fmv

@@ -3,13 +3,14 @@
 
 #include <cles/setting_error.hpp>
 
-#include "base64.hpp"
+#include "frame_codec.hpp"
 #include "messages.hpp"
 #include "streams.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <memory>
 #include <string>
 
@@ -38,39 +39,65 @@ struct shop {
     std::atomic<std::uint64_t> frames{0}, repeated{0}, refused{0}, bad{0};
 };
 
+void require(bool fits, const char* what) {
+    if (!fits) {
+        throw error(errc::bad_request, what);
+    }
+}
+
+bool is_within(double value, double low, double high) { return value >= low && value <= high; } // false for NaN
+
+void check(const camera_message& from) {
+    require(is_within(from.lat, -89, 89), "camera.lat: -89 to 89 degrees");
+    require(is_within(from.lon, -180, 180), "camera.lon: -180 to 180 degrees");
+    require(is_within(from.height, 1, 50'000), "camera.height: 1 to 50000 m above the ground");
+    require(is_within(from.azimuth, -360, 360), "camera.azimuth: -360 to 360 degrees");
+    require(is_within(from.depression, 10, 90), "camera.depression: 10 to 90 degrees below the horizon");
+    require(is_within(from.field_of_view, 0.01, 120), "camera.field_of_view: 0.01 to 120 degrees");
+    require(is_within(from.position_sigma, 0, 1000), "camera.position_sigma: 0 to 1000 m");
+    require(is_within(from.pointing_sigma, 0, 10), "camera.pointing_sigma: 0 to 10 degrees");
+}
+
 extent checked(const frame_message& what) {
     const extent size{.width = what.width, .height = what.height};
-    if (what.stream.empty() || what.stream.size() > 64) {
-        throw error(errc::bad_request, "stream: 1 to 64 characters");
-    }
+    require(!what.stream.empty() && what.stream.size() <= 64, "stream: 1 to 64 characters");
     if (std::min(size.width, size.height) < least_side || std::max(size.width, size.height) > most_side ||
         size.pixels() > most_pixels) {
         throw error(errc::bad_request, "width and height: " + std::to_string(least_side) + " to " +
                                            std::to_string(most_side) + ", " + std::to_string(most_pixels) +
                                            " pixels at most");
     }
+    require(what.format == "grey" || what.format == "jpeg", "format: grey or jpeg");
+    require(what.format == "grey" || has_jpeg(),
+            "format: this node is built without libjpeg-turbo, and takes only grey");
+    require(is_within(what.utc, 0, 1e11), "utc: seconds since 1970");
+    check(what.camera);
     return size;
 }
 
-found look(kept_stream& at, const frame_message& what, grey frame, shop& counts) {
+grey decoded(const frame_message& what, extent size) {
+    auto pixels = decode(what.picture, size, what.format);
+    if (!pixels) {
+        throw error(errc::bad_request, what.format == "jpeg"
+                                           ? "picture: not the base64 of a JPEG of " + std::to_string(size.width) +
+                                                 " x " + std::to_string(size.height) + " pixels"
+                                           : "picture: not the base64 of " + std::to_string(size.pixels()) + " bytes");
+    }
+    return std::move(*pixels);
+}
+
+found look(kept_stream& at, const frame_message& what, const grey& frame, shop& counts) {
     found out{.frame = what.frame};
     if (what.frame < at.next) {
         ++counts.repeated;
     } else {
-        at.video.take(std::move(frame), static_cast<int>(std::min<std::uint64_t>(what.frame + 1 - at.next, 1000)));
+        require(!at.video.utc() || what.utc > *at.video.utc(), "utc: later than that of the frame before");
+        at.video.take(frame, what.camera, what.utc);
         at.next = what.frame + 1;
         ++counts.frames;
     }
     out.ready = at.video.ready();
-    for (const auto& t : at.video.targets()) {
-        out.tracks.push_back({.id = t.id,
-                              .x = t.at.x,
-                              .y = t.at.y,
-                              .vx = t.velocity.x,
-                              .vy = t.velocity.y,
-                              .age = t.age,
-                              .missed = t.missed});
-    }
+    out.tracks = at.video.tracks();
     return out;
 }
 
@@ -80,10 +107,7 @@ void process(const cles::request& asked, const cles::responder& answer, shop& he
     try {
         const auto what = asked.as<frame_message>();
         const auto size = checked(what);
-        auto pixels = from_base64(what.pixels, size.pixels());
-        if (!pixels) {
-            throw error(errc::bad_request, "pixels: not the base64 of " + std::to_string(size.pixels()) + " bytes");
-        }
+        const auto pixels = decoded(what, size);
         const auto at = here.all.find(what.stream, size, begun);
         if (!at) {
             ++here.refused;
@@ -96,10 +120,8 @@ void process(const cles::request& asked, const cles::responder& answer, shop& he
             answer.refuse("the stream's last frame is still being processed", std::chrono::milliseconds{5});
             return;
         }
-        if (at->video.size() != size) {
-            throw error(errc::bad_request, "the stream began with frames of another size");
-        }
-        auto out = look(*at, what, std::move(*pixels), here);
+        require(at->video.size() == size, "the stream began with frames of another size");
+        auto out = look(*at, what, pixels, here);
         mine.unlock(); // the next frame may come as soon as this one is answered
         out.node = asked.node();
         const auto whole = milliseconds{static_cast<double>(what.deadline_ms)};

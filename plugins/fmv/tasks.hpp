@@ -21,9 +21,8 @@ BOOST_DESCRIBE_STRUCT(settings, (), (streams, idle_s))
 
 /// Finds what moves in full motion video (paper, sections 2.2 and 4.3).
 ///
-/// - DELEGATE FMV_Processing {"stream","frame","width","height","deadline_ms","pixels"}: the tracks after that frame;
-/// see
-///   `frame_message` and `found`. A frame that has been taken already changes nothing.
+/// - DELEGATE FMV_Processing: the tracks after one more frame; see `frame_message` and `found`. A frame that has been
+/// taken already changes nothing.
 /// - PULL FMV_Processing: streams, and what became of the frames
 void register_tasks(cles::registrar& to, const settings& wanted);
 

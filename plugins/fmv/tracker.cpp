@@ -9,8 +9,11 @@
 namespace fmv {
 namespace {
 
-constexpr double gate = 6;       ///< pixels from where it is predicted
-constexpr double young_gate = 8; ///< while its velocity is not known
+constexpr double gate = 6;              ///< pixels from where it is predicted
+constexpr double young_gate = 8;        ///< while its velocity is not known
+constexpr double usual_interval = 0.04; ///< s, between frames: for larger ones the gates are wider
+constexpr double most_wider = 3;
+constexpr double place_deviation = 0.4; ///< pixels, of a detection
 constexpr double alpha = 0.5;
 constexpr double beta = 0.2;
 constexpr int least_hits = 6;        ///< M
@@ -24,26 +27,27 @@ double distance(point a, point b) { return std::hypot(a.x - b.x, a.y - b.y); }
 
 } // namespace
 
-void tracker::step(std::span<const detection> seen, int frames) {
-    predict(frames);
-    associate(seen, frames);
+void tracker::step(std::span<const detection> seen, double seconds) {
+    predict(seconds);
+    associate(seen, seconds);
     judge();
 }
 
-void tracker::predict(int frames) {
+void tracker::predict(double seconds) {
     for (auto& t : all_) {
-        t.at.x += t.velocity.x * frames;
-        t.at.y += t.velocity.y * frames;
+        t.at.x += t.velocity.x * seconds;
+        t.at.y += t.velocity.y * seconds;
         t.history <<= 1U;
-        t.age += frames;
+        t.age += seconds;
         ++t.looks;
         ++t.missed;
     }
 }
 
 // The nearest pairs first; those that are confirmed have the first choice.
-void tracker::associate(std::span<const detection> seen, int frames) {
-    const double wider = std::min(frames, 3);
+void tracker::associate(std::span<const detection> seen, double seconds) {
+    const double wider = std::clamp(seconds / usual_interval, 1.0, most_wider);
+    const double apart = std::max(seconds, usual_interval / 2); // noise over a moment is no velocity
     std::vector<std::tuple<bool, double, std::size_t, std::size_t>> pairs;
     for (std::size_t i = 0; i < all_.size(); ++i) {
         for (std::size_t k = 0; k < seen.size(); ++k) {
@@ -66,7 +70,7 @@ void tracker::associate(std::span<const detection> seen, int frames) {
         const double a = t.looks == 1 ? 1 : alpha;
         const double b = t.looks == 1 ? 1 : beta;
         t.at = {t.at.x + a * off.x, t.at.y + a * off.y};
-        t.velocity = {t.velocity.x + b * off.x / frames, t.velocity.y + b * off.y / frames};
+        t.velocity = {t.velocity.x + b * off.x / apart, t.velocity.y + b * off.y / apart};
         t.missed = 0;
         t.history |= 1U;
     }
@@ -85,6 +89,11 @@ void tracker::judge() {
         t.confirmed = t.confirmed || (hits >= least_hits && distance(t.at, t.first) >= least_path);
     }
     std::erase_if(all_, [](const tracked& t) { return t.missed > (t.confirmed ? most_missed : most_missed_young); });
+}
+
+// Of an alpha-beta filter in its steady state (Kalata, "The tracking index", 1984).
+double tracker::velocity_deviation(double seconds) {
+    return place_deviation * std::sqrt(2 * beta * beta / (alpha * (4 - 2 * alpha - beta))) / seconds;
 }
 
 std::vector<tracked> tracker::confirmed() const {

@@ -13,10 +13,10 @@ namespace fmv {
 struct tracked {
     std::uint64_t id = 0; ///< the same as long as it is followed
     point at{};
-    point velocity{};     ///< pixels per frame
+    point velocity{};     ///< pixels per second
     point first{};        ///< where it was first seen
     unsigned history = 1; ///< a bit for each look since, the lowest being the latest: 1 where it was seen
-    int age = 0;          ///< frames
+    double age = 0;       ///< s
     int looks = 0;        ///< since it was first seen
     int missed = 0;       ///< looks since it was last seen
     bool confirmed = false;
@@ -27,14 +27,17 @@ struct tracked {
 /// moved, is confirmed; noise does the first seldom, and what a false background shows does not do the second.
 class tracker {
   public:
-    /// The detections of the frame that follows `frames` after the last one.
-    void step(std::span<const detection> seen, int frames = 1);
+    /// The detections of the frame that was taken so many seconds after the last one. \pre more than 0
+    void step(std::span<const detection> seen, double seconds);
     /// Those that are confirmed.
     [[nodiscard]] std::vector<tracked> confirmed() const;
+    /// The standard deviation of a velocity, per axis, after many frames that are so many seconds apart: pixels per
+    /// second.
+    static double velocity_deviation(double seconds);
 
   private:
-    void predict(int frames);
-    void associate(std::span<const detection> seen, int frames);
+    void predict(double seconds);
+    void associate(std::span<const detection> seen, double seconds);
     void judge();
 
     std::vector<tracked> all_;

@@ -6,11 +6,11 @@
 namespace strike {
 
 // |d + v t| = s t, which is (v.v - s^2) t^2 + 2 d.v t + d.d = 0; the first t that is not negative.
-std::optional<meeting> intercept(place from, double speed, place target, place velocity) {
+std::optional<meeting> intercept(place from, double speed, place target, place velocity, double height) {
     const place d{target.x - from.x, target.y - from.y};
     const double a = velocity.x * velocity.x + velocity.y * velocity.y - speed * speed;
     const double half_b = d.x * velocity.x + d.y * velocity.y;
-    const double c = d.x * d.x + d.y * d.y;
+    const double c = d.x * d.x + d.y * d.y + height * height;
     double t = 0;
     if (c > 0) {
         if (std::abs(a) < 1e-12 * speed * speed) { // as fast as each other

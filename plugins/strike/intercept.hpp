@@ -16,7 +16,7 @@ struct meeting {
 };
 
 /// Where something that leaves `from` now, at a constant speed, meets a target that moves on as it does; nowhere, where
-/// the target gets away. Velocities are per second.
-std::optional<meeting> intercept(place from, double speed, place target, place velocity);
+/// the target gets away. Velocities are per second. `from` is `height` above the ground.
+std::optional<meeting> intercept(place from, double speed, place target, place velocity, double height = 0);
 
 } // namespace strike

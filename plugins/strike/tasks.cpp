@@ -3,7 +3,7 @@
 
 #include <cles/setting_error.hpp>
 
-#include "intercept.hpp"
+#include "engagement.hpp"
 #include "magazine.hpp"
 #include "order.hpp"
 
@@ -29,16 +29,24 @@ struct inventory {
 };
 BOOST_DESCRIBE_STRUCT(inventory, (), (left, orders))
 
+aircraft_state state_of(const settings& wanted) {
+    const auto usual = default_state();
+    return {.at = {.lat = wanted.lat.value_or(usual.at.lat), .lon = wanted.lon.value_or(usual.at.lon)},
+            .height = wanted.height.value_or(usual.height),
+            .speed = wanted.speed.value_or(usual.speed),
+            .scans = wanted.scans.value_or(usual.scans)};
+}
+
 struct aircraft {
     explicit aircraft(const settings& wanted)
-        : weapons(wanted.weapons.value_or(4)), at{wanted.x.value_or(-100), wanted.y.value_or(120)},
-          speed(wanted.speed.value_or(400)), oldest_s(wanted.oldest_s.value_or(2)) {}
+        : weapons(wanted.weapons.value_or(4)), oldest_s(wanted.oldest_s.value_or(2)), state(state_of(wanted)),
+          sensor(wanted.seed.value_or(1), state.at) {}
 
     std::mutex lock; // in an application, a test or a daemon: any thread calls
     magazine weapons;
-    place at;
-    double speed;
     double oldest_s;
+    aircraft_state state;
+    own_sensor sensor;
 };
 
 double utc_now() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
@@ -47,10 +55,16 @@ void check(const order& what, double age, const aircraft& own) {
     if (what.id.empty() || what.id.size() > 64) {
         throw error(errc::bad_request, "id: 1 to 64 characters");
     }
-    for (const double number : {what.x, what.y, what.vx, what.vy, what.utc}) {
+    for (const double number : {what.ve, what.vn, what.utc}) {
         if (!std::isfinite(number)) {
-            throw error(errc::bad_request, "x, y, vx, vy and utc: numbers");
+            throw error(errc::bad_request, "ve, vn and utc: numbers");
         }
+    }
+    if (!(std::abs(what.lat) <= 89 && std::abs(what.lon) <= 180)) {
+        throw error(errc::bad_request, "lat and lon: degrees, -89 to 89 and -180 to 180");
+    }
+    if (!(what.sigma > 0 && what.sigma <= 1000 && what.sigma_v > 0 && what.sigma_v <= 1000)) {
+        throw error(errc::bad_request, "sigma and sigma_v: more than 0, 1000 at most");
     }
     if (std::abs(age) > own.oldest_s) {
         throw error(errc::failed,
@@ -69,7 +83,7 @@ void carry_out(const cles::request& asked, const cles::responder& answer, aircra
     const double now = utc_now();
     const double age = now - what.utc;
     check(what, age, own);
-    const auto hit = intercept(own.at, own.speed, {what.x + what.vx * age, what.y + what.vy * age}, {what.vx, what.vy});
+    const auto hit = engage(what, now, own.state, own.sensor);
     if (!hit) {
         throw error(errc::failed, "the target is too fast");
     }
@@ -83,8 +97,10 @@ void carry_out(const cles::request& asked, const cles::responder& answer, aircra
     const auto whole = milliseconds{static_cast<double>(what.deadline_ms)};
     answer.done(outcome{.node = std::string{asked.node()},
                         .order = what.id,
-                        .aim_x = hit->where.x,
-                        .aim_y = hit->where.y,
+                        .aim_lat = hit->at.lat,
+                        .aim_lon = hit->at.lon,
+                        .sigma = hit->sigma,
+                        .plots = hit->plots,
                         .impact_utc = now + hit->after_s,
                         .flight_s = hit->after_s,
                         .left = own.weapons.left(),
@@ -102,8 +118,10 @@ void require(bool fits, const char* key, const char* what) {
 
 void settings::check() const {
     require(weapons.value_or(4) <= 1000, "weapons", "weapons: 1000 at most");
-    require(std::isfinite(x.value_or(0)), "x", "x and y: numbers");
-    require(std::isfinite(y.value_or(0)), "y", "x and y: numbers");
+    require(std::abs(lat.value_or(0)) <= 89, "lat", "lat: -89 to 89 degrees");
+    require(std::abs(lon.value_or(0)) <= 180, "lon", "lon: -180 to 180 degrees");
+    require(height.value_or(0) >= 0 && height.value_or(0) <= 50'000, "height", "height: 0 to 50000 m");
+    require(scans.value_or(0) <= 100, "scans", "scans: 100 at most");
     require(speed.value_or(400) > 0 && std::isfinite(speed.value_or(400)), "speed", "speed: more than 0");
     require(oldest_s.value_or(2) > 0 && std::isfinite(oldest_s.value_or(2)), "oldest_s", "oldest_s: more than 0");
 }

@@ -45,4 +45,25 @@ BOOST_AUTO_TEST_CASE(it_follows_the_light_but_slowly_what_was_detected) {
     BOOST_TEST(still.values()[size.at(5, 5)] > 100);
 }
 
+BOOST_AUTO_TEST_CASE(what_is_not_seen_does_not_differ_and_what_is_new_is_background) {
+    fmv::background still{size};
+    fmv::grey seen(size.pixels(), 1);
+    seen[size.at(5, 5)] = 0;
+    const auto show = [&](std::uint8_t brightness) {
+        fmv::grey frame(size.pixels(), brightness);
+        frame[size.at(5, 5)] = seen[size.at(5, 5)] != 0 ? 170 : 0;
+        still.complete(frame, seen);
+        return frame;
+    };
+    while (!still.known()) {
+        still.learn(show(100));
+    }
+    seen[size.at(5, 5)] = 1; // for the first time
+    seen[size.at(9, 9)] = 0;
+    const auto frame = show(120);
+    BOOST_TEST(still.values()[size.at(5, 5)] == 170);
+    BOOST_TEST(frame[size.at(9, 9)] == 100);
+    BOOST_TEST(frame[size.at(20, 20)] == 120);
+}
+
 BOOST_AUTO_TEST_SUITE_END()

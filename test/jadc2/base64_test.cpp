@@ -35,6 +35,7 @@ BOOST_AUTO_TEST_CASE(all_bytes_come_back_at_each_length) {
         const auto back = fmv::from_base64(fmv::to_base64(bytes), size);
         BOOST_TEST_REQUIRE(back.has_value());
         BOOST_TEST((*back == bytes));
+        BOOST_TEST(fmv::base64_size(fmv::to_base64(bytes)) == size);
     }
 }
 

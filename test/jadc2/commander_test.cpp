@@ -42,9 +42,9 @@ BOOST_AUTO_TEST_CASE(against_one_target_there_is_one_order) {
 
 BOOST_AUTO_TEST_CASE(a_target_is_found_by_its_number) {
     jadc2::commander c;
-    c.set_picture(picture_of({{.id = 3, .x = 7}}));
+    c.set_picture(picture_of({{.id = 3, .lat = 7}}));
     BOOST_TEST_REQUIRE(c.find(3).has_value());
-    BOOST_TEST(c.find(3)->x == 7);
+    BOOST_TEST(c.find(3)->lat == 7);
     BOOST_TEST(!c.find(4));
 }
 

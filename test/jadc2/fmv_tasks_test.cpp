@@ -2,6 +2,7 @@
 #include <cles/service.hpp>
 
 #include "fmv/base64.hpp"
+#include "fmv/frame_codec.hpp"
 #include "fmv/messages.hpp"
 #include "fmv/streams.hpp"
 #include "fmv/tasks.hpp"
@@ -12,6 +13,8 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <cmath>
+#include <limits>
 #include <string>
 
 namespace fmv_tasks {
@@ -27,11 +30,15 @@ struct fixture : cles::test::asked_node {
     [[nodiscard]] fmv::frame_message frame(std::uint64_t number, const std::string& stream = "a") const {
         return {.stream = stream,
                 .frame = number,
+                .utc = time_of(number),
                 .width = scene::size.width,
                 .height = scene::size.height,
                 .deadline_ms = 30'000,
-                .pixels = fmv::to_base64(ground.frame(number))};
+                .camera = ground.reported(time_of(number)),
+                .format = "grey",
+                .picture = fmv::to_base64(ground.frame(number, time_of(number)))};
     }
+    static double time_of(std::uint64_t number) { return 1000 + static_cast<double>(number) * 0.04; }
 
     scene ground{1};
 };
@@ -56,7 +63,15 @@ BOOST_AUTO_TEST_CASE(frames_become_tracks) {
         BOOST_TEST(last.queue_ms < 1000);
         BOOST_TEST(last.ready == (i + 1 >= fmv::background::learning));
     }
-    BOOST_TEST(last.tracks.size() >= 2U);
+    BOOST_TEST_REQUIRE(last.tracks.size() >= 2U);
+    for (const auto& t : last.tracks) { // on the ground, near the middle of the area
+        const auto at = scene::plane().to_plane({.lat = t.lat, .lon = t.lon});
+        BOOST_TEST(std::hypot(at.east, at.north) < 120);
+        BOOST_TEST(std::hypot(t.ve, t.vn) > 5);
+        BOOST_TEST(std::hypot(t.ve, t.vn) < 30);
+        BOOST_TEST(t.sigma > 2);
+        BOOST_TEST(t.sigma < 4);
+    }
     BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":1,"frames":60,"repeated":0,"refused":0,"bad":0})");
 }
 
@@ -86,11 +101,19 @@ BOOST_AUTO_TEST_CASE(streams_are_apart_and_no_more_than_so_many) {
 
 BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     auto what = frame(0);
-    what.pixels.pop_back();
-    BOOST_TEST(send(what) == "bad_request: node: pixels: not the base64 of 76800 bytes");
+    what.picture.pop_back();
+    BOOST_TEST(send(what) == "bad_request: node: picture: not the base64 of 76800 bytes");
     what = frame(0);
-    what.pixels.front() = '!';
-    BOOST_TEST(send(what) == "bad_request: node: pixels: not the base64 of 76800 bytes");
+    what.picture.front() = '!';
+    BOOST_TEST(send(what) == "bad_request: node: picture: not the base64 of 76800 bytes");
+    what = frame(0);
+    what.format = "png";
+    BOOST_TEST(send(what) == "bad_request: node: format: grey or jpeg");
+    what.format = "jpeg"; // which it is not
+    BOOST_TEST(send(what) == (fmv::has_jpeg()
+                                  ? "bad_request: node: picture: not the base64 of a JPEG of 320 x 240 pixels"
+                                  : "bad_request: node: format: this node is built without libjpeg-turbo, "
+                                    "and takes only grey"));
     for (const auto& [width, height] : {std::pair{63, 240}, {240, -1}, {1025, 240}, {1024, 1024}}) {
         what = frame(0);
         what.width = width;
@@ -105,8 +128,35 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     BOOST_TEST(ask("DELEGATE self:FMV_Processing {}").starts_with("bad_request: node: the body is invalid: stream"));
     send(frame(0));
     what = frame(1);
+    what.utc = frame(0).utc;
+    BOOST_TEST(send(what) == "bad_request: node: utc: later than that of the frame before");
+    what = frame(1);
     std::swap(what.width, what.height);
     BOOST_TEST(send(what) == "bad_request: node: the stream began with frames of another size");
+}
+
+BOOST_AUTO_TEST_CASE(cameras_that_cannot_be_are_refused) {
+    const auto refused = [this](auto change) {
+        auto what = frame(0);
+        change(what.camera);
+        return send(what);
+    };
+    using camera = fmv::camera_message;
+    BOOST_TEST(refused([](camera& c) { c.lat = 90; }) == "bad_request: node: camera.lat: -89 to 89 degrees");
+    BOOST_TEST(refused([](camera& c) { c.lon = 181; }) == "bad_request: node: camera.lon: -180 to 180 degrees");
+    BOOST_TEST(refused([](camera& c) { c.height = 0; }) ==
+               "bad_request: node: camera.height: 1 to 50000 m above the ground");
+    BOOST_TEST(refused([](camera& c) { c.azimuth = std::numeric_limits<double>::infinity(); }) ==
+               "bad_request: node: camera.azimuth: -360 to 360 degrees");
+    BOOST_TEST(refused([](camera& c) { c.depression = 0; }) ==
+               "bad_request: node: camera.depression: 10 to 90 degrees below the horizon");
+    BOOST_TEST(refused([](camera& c) { c.field_of_view = 180; }) ==
+               "bad_request: node: camera.field_of_view: 0.01 to 120 degrees");
+    BOOST_TEST(refused([](camera& c) { c.position_sigma = -1; }) ==
+               "bad_request: node: camera.position_sigma: 0 to 1000 m");
+    BOOST_TEST(refused([](camera& c) { c.pointing_sigma = 11; }) ==
+               "bad_request: node: camera.pointing_sigma: 0 to 10 degrees");
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":0,"frames":0,"repeated":0,"refused":0,"bad":8})");
 }
 
 BOOST_AUTO_TEST_CASE(settings_that_cannot_be) {

@@ -45,4 +45,11 @@ BOOST_AUTO_TEST_CASE(one_that_is_here_is_met_at_once) {
     BOOST_TEST(hit->after_s == 0);
 }
 
+BOOST_AUTO_TEST_CASE(from_above_the_way_is_longer) {
+    const auto hit = strike::intercept({0, 0}, 10, {30, 40}, {0, 0}, 120);
+    BOOST_TEST_REQUIRE(hit.has_value());
+    BOOST_TEST(hit->after_s == 13);
+    BOOST_TEST(hit->where.x == 30);
+}
+
 BOOST_AUTO_TEST_SUITE_END()

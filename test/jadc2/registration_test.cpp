@@ -4,6 +4,8 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <cstdlib>
+
 namespace registration {
 namespace {
 
@@ -15,11 +17,11 @@ std::uint8_t ground(int x, int y) {
     return static_cast<std::uint8_t>(60 + chance.below(120));
 }
 
-fmv::grey picture_from(int left, int top) {
-    fmv::grey out(size.pixels());
+fmv::rectified picture_from(int left, int top) {
+    fmv::rectified out{.pixels = fmv::grey(size.pixels()), .seen = fmv::grey(size.pixels(), 1)};
     for (int y = 0; y < size.height; ++y) {
         for (int x = 0; x < size.width; ++x) {
-            out[size.at(x, y)] = ground(x + left, y + top);
+            out.pixels[size.at(x, y)] = ground(x + left, y + top);
         }
     }
     return out;
@@ -31,7 +33,7 @@ fmv::grey picture_from(int left, int top) {
 BOOST_AUTO_TEST_SUITE(registration)
 
 BOOST_AUTO_TEST_CASE(each_shift_is_found) {
-    const auto reference = picture_from(0, 0);
+    const auto reference = picture_from(0, 0).pixels;
     for (int dy = -fmv::most_shift; dy <= fmv::most_shift; ++dy) {
         for (int dx = -fmv::most_shift; dx <= fmv::most_shift; ++dx) {
             BOOST_TEST((fmv::register_with(reference, picture_from(dx, dy), size) == fmv::shift{dx, dy}));
@@ -43,18 +45,34 @@ BOOST_AUTO_TEST_CASE(what_moves_in_it_does_not_mislead) {
     auto picture = picture_from(2, -3);
     for (int y = 20; y < 36; ++y) {
         for (int x = 30; x < 50; ++x) {
-            picture[size.at(x, y)] = 255;
+            picture.pixels[size.at(x, y)] = 255;
         }
     }
-    BOOST_TEST((fmv::register_with(picture_from(0, 0), picture, size) == fmv::shift{2, -3}));
+    BOOST_TEST((fmv::register_with(picture_from(0, 0).pixels, picture, size) == fmv::shift{2, -3}));
 }
 
-BOOST_AUTO_TEST_CASE(an_aligned_picture_is_the_reference_again) {
-    const auto reference = picture_from(0, 0);
+BOOST_AUTO_TEST_CASE(what_was_not_seen_does_not_count) {
+    auto picture = picture_from(-1, 3);
+    for (int y = 0; y < size.height; ++y) {
+        for (int x = 0; x < size.width / 2; ++x) { // as if nothing had moved there
+            picture.pixels[size.at(x, y)] = ground(x, y);
+            picture.seen[size.at(x, y)] = 0;
+        }
+    }
+    BOOST_TEST((fmv::register_with(picture_from(0, 0).pixels, picture, size) == fmv::shift{-1, 3}));
+}
+
+BOOST_AUTO_TEST_CASE(an_aligned_picture_is_the_reference_where_it_was_seen) {
+    const auto reference = picture_from(0, 0).pixels;
     for (const auto by : {fmv::shift{0, 0}, fmv::shift{3, -2}, fmv::shift{-4, 4}}) {
         auto picture = picture_from(by.dx, by.dy);
-        fmv::align(reference, picture, size, by);
-        BOOST_TEST((picture == reference));
+        fmv::align(picture, size, by);
+        std::size_t seen = 0;
+        for (std::size_t i = 0; i < reference.size(); ++i) {
+            BOOST_TEST_REQUIRE((picture.seen[i] == 0 || picture.pixels[i] == reference[i]));
+            seen += picture.seen[i];
+        }
+        BOOST_TEST(seen == static_cast<std::size_t>((size.width - std::abs(by.dx)) * (size.height - std::abs(by.dy))));
     }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
+#include "geo/traffic.hpp"
 #include "strike/order.hpp"
 #include "strike/tasks.hpp"
 #include "support/answer.hpp"
@@ -9,6 +10,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -17,13 +19,23 @@
 namespace strike_tasks {
 namespace {
 
+const geo::geographic here{.lat = 48, .lon = 11}; // far from what its sensor sees
+const geo::tangent_plane plane{here};
+
 double now() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 
 struct fixture : cles::test::asked_node {
-    fixture() { strike::register_tasks(node, {.weapons = 2, .x = 0, .y = 0, .speed = 100, .oldest_s = 60}); }
+    fixture() {
+        strike::register_tasks(
+            node, {.weapons = 2, .lat = here.lat, .lon = here.lon, .height = 0, .speed = 100, .oldest_s = 60});
+    }
     std::string give(const strike::order& what) { return ask("DELEGATE self:strike " + cles::to_json(what)); }
     static strike::order order(const std::string& id) {
-        return {.id = id, .x = 300, .y = 400, .utc = now(), .deadline_ms = 30'000};
+        const auto at = plane.to_geographic({.east = 300, .north = 400});
+        return {.id = id, .lat = at.lat, .lon = at.lon, .sigma = 3, .sigma_v = 1, .utc = now(), .deadline_ms = 30'000};
+    }
+    static geo::plane_position aim(const strike::outcome& out) {
+        return plane.to_plane({.lat = out.aim_lat, .lon = out.aim_lon});
     }
 };
 
@@ -41,10 +53,11 @@ BOOST_AUTO_TEST_CASE(an_order_is_carried_out) {
     const auto out = cles::from_json<strike::outcome>(give(order("o1")));
     BOOST_TEST(out.node == "node");
     BOOST_TEST(out.order == "o1");
-    BOOST_TEST(out.aim_x == 300);
-    BOOST_TEST(out.aim_y == 400);
-    BOOST_TEST(out.flight_s == 5);
-    BOOST_TEST(out.impact_utc >= before + 5);
+    BOOST_TEST(std::hypot(aim(out).east - 300, aim(out).north - 400) < 1e-3);
+    BOOST_TEST(std::abs(out.flight_s - 5) < 1e-6);
+    BOOST_TEST(out.impact_utc >= before + 4.999);
+    BOOST_TEST(out.plots == 0U);
+    BOOST_TEST(out.sigma > 3);
     BOOST_TEST(out.left == 1U);
     BOOST_TEST(out.run_ms > 0);
     BOOST_TEST(ask("PULL self:strike") == R"({"left":1,"orders":["o1"]})");
@@ -52,11 +65,34 @@ BOOST_AUTO_TEST_CASE(an_order_is_carried_out) {
 
 BOOST_AUTO_TEST_CASE(it_is_aimed_at_where_the_target_will_be) {
     auto what = order("o1");
-    what.vx = 20;
+    what.ve = 20;
     what.utc -= 10; // the time since it was seen there
     const auto out = cles::from_json<strike::outcome>(give(what));
-    BOOST_TEST(std::abs(out.aim_x - (300 + 20 * (10 + out.flight_s))) < 2); // the time that this takes
-    BOOST_TEST(std::abs(std::hypot(out.aim_x, out.aim_y) - 100 * out.flight_s) < 1e-6);
+    BOOST_TEST(std::abs(aim(out).east - (300 + 20 * (10 + out.flight_s))) < 2); // the time that this takes
+    BOOST_TEST(std::abs(std::hypot(aim(out).east, aim(out).north) - 100 * out.flight_s) < 1e-3);
+}
+
+BOOST_AUTO_TEST_CASE(what_its_own_sensor_sees_is_fused) {
+    cles::test::asked_node there; // near the traffic, as it is by default
+    strike::register_tasks(there.node, {.oldest_s = 60});
+    const double utc = now();
+    const auto all = geo::traffic{1}.at(utc);
+    const auto target = *std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
+        return std::hypot(a.at.east, a.at.north) < std::hypot(b.at.east, b.at.north); // so that it stays on its road
+    });
+    const auto at = geo::tangent_plane{geo::traffic::origin}.to_geographic(target.at);
+    const strike::order what{.id = "o1",
+                             .lat = at.lat,
+                             .lon = at.lon,
+                             .ve = target.velocity.east,
+                             .vn = target.velocity.north,
+                             .sigma = 3,
+                             .sigma_v = 1,
+                             .utc = utc,
+                             .deadline_ms = 30'000};
+    const auto out = cles::from_json<strike::outcome>(there.ask("DELEGATE self:strike " + cles::to_json(what)));
+    BOOST_TEST(out.plots > 10U);
+    BOOST_TEST(out.sigma < 2);
 }
 
 BOOST_AUTO_TEST_CASE(no_order_is_carried_out_twice) {
@@ -75,7 +111,7 @@ BOOST_AUTO_TEST_CASE(without_a_weapon_it_is_for_another) {
 BOOST_AUTO_TEST_CASE(a_drill_is_all_but_the_release) {
     auto what = order("o1");
     what.drill = true;
-    BOOST_TEST(cles::from_json<strike::outcome>(give(what)).flight_s == 5);
+    BOOST_TEST(std::abs(cles::from_json<strike::outcome>(give(what)).flight_s - 5) < 1e-6);
     BOOST_TEST(cles::from_json<strike::outcome>(give(what)).left == 2U);
     BOOST_TEST(ask("PULL self:strike") == R"({"left":2,"orders":[]})");
 }
@@ -84,15 +120,21 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     auto what = order("");
     BOOST_TEST(give(what) == "bad_request: node: id: 1 to 64 characters");
     what = order("o1");
-    what.x = std::numeric_limits<double>::infinity();
-    BOOST_TEST(give(what) == "bad_request: node: x, y, vx, vy and utc: numbers");
+    what.vn = std::numeric_limits<double>::infinity();
+    BOOST_TEST(give(what) == "bad_request: node: ve, vn and utc: numbers");
+    what = order("o1");
+    what.lat = 90;
+    BOOST_TEST(give(what) == "bad_request: node: lat and lon: degrees, -89 to 89 and -180 to 180");
+    what = order("o1");
+    what.sigma = 0;
+    BOOST_TEST(give(what) == "bad_request: node: sigma and sigma_v: more than 0, 1000 at most");
     what = order("o1");
     what.utc -= 100;
     BOOST_TEST(give(what).starts_with("failed: node: the track is 100."));
     what.utc += 200;
     BOOST_TEST(give(what).starts_with("failed: node: the track is -"));
     what = order("o1");
-    what.vx = 1000;
+    what.ve = 1000;
     BOOST_TEST(give(what) == "failed: node: the target is too fast");
     BOOST_TEST(ask("PULL self:strike") == R"({"left":2,"orders":[]})");
 }
@@ -108,7 +150,8 @@ BOOST_AUTO_TEST_CASE(orders_that_must_be_signed) {
 BOOST_AUTO_TEST_CASE(settings_that_cannot_be) {
     for (const auto& wrong :
          {strike::settings{.weapons = 1001}, strike::settings{.speed = 0}, strike::settings{.oldest_s = -1},
-          strike::settings{.x = std::numeric_limits<double>::quiet_NaN()}}) {
+          strike::settings{.lat = std::numeric_limits<double>::quiet_NaN()}, strike::settings{.lon = 181},
+          strike::settings{.height = -1}, strike::settings{.scans = 101}}) {
         boost::asio::io_context other;
         cles::service there{other, {.name = "there"}};
         BOOST_CHECK_THROW(strike::register_tasks(there, wrong), cles::error);

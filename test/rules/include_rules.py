@@ -129,6 +129,7 @@ RESERVED_HEADERS = [
     (re.compile(r"sodium(\.h$|/)"), re.compile(r"libcles/src/security/|test/security/|test/simulation/secured/"), "libsodium belongs to security alone"),
     (re.compile(r"openssl/"), re.compile(r"libcles/src/tls/|libcles/src/nats/tls_watch\.cpp$|test/tls/|test/perf/sealed_pull\.cpp$"),
      "OpenSSL belongs to tls alone"),
+    (re.compile(r"turbojpeg\.h$"), re.compile(r"plugins/fmv/frame_codec\.cpp$"), "libjpeg-turbo belongs to fmv/frame_codec.cpp alone"),
     (re.compile(r"node/secured/"), re.compile(r"libcles/src/(node/secured|api)/|test/"),
      "programs without security do not contain it: use node/security_protocol.hpp"),
     (re.compile(r"spdlog/"), re.compile(r"(?!libcles/)"), "the library logs through its sink; spdlog is for programs"),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-namespace platoon {
+namespace geo {
 
 /// A position on the ellipsoid WGS 84, in degrees.
 struct geographic {
@@ -27,4 +27,4 @@ class tangent_plane {
     geographic origin_;
 };
 
-} // namespace platoon
+} // namespace geo

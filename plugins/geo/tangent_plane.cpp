@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace platoon {
+namespace geo {
 namespace {
 
 constexpr double semi_major = 6378137;           // m, WGS 84
@@ -39,4 +39,4 @@ geographic tangent_plane::to_geographic(const plane_position& at) const {
     return {.lat = origin_.lat + at.north / scale.north, .lon = origin_.lon + at.east / scale.east};
 }
 
-} // namespace platoon
+} // namespace geo
