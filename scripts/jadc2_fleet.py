@@ -63,14 +63,15 @@ class Loopback:
 
 
 class Namespaces:
-    """A host for each role. Two hosts are connected only if there is a link between them. Requires root."""
+    """A host for each role. Two hosts are connected only if there is a link between them. With `kbit`, the links of the
+    mission centre carry so many kilobits per second in each direction. Requires root."""
 
     insecure = True
     # Each cable: the role that listens, and the role that connects.
     CABLES = [("satellite", "recon"), ("spare", "recon"), ("recon", "mission"), ("strike", "mission")]
 
-    def __init__(self):
-        self.keepers, self.addresses = {}, {}
+    def __init__(self, kbit=None):
+        self.keepers, self.addresses, self.devices = {}, {}, {}
         try:
             for role in ("satellite", "spare", "recon", "mission", "strike"):
                 self._keep(role)
@@ -82,6 +83,9 @@ class Namespaces:
                     self.addresses[role, (asks, listens)[end - 1]] = f"10.78.{number}.{end}"
                     self._ip(role, "address", "add", f"10.78.{number}.{end}/24", "dev", f"to{number}")
                     self._ip(role, "link", "set", f"to{number}", "up")
+                    self.devices[role, (asks, listens)[end - 1]] = f"to{number}"
+                    if kbit and asks == "mission":
+                        self._limit(role, f"to{number}", kbit)
         except BaseException as failure:
             self.close()
             if not isinstance(failure, (OSError, subprocess.CalledProcessError, Trouble)):
@@ -101,6 +105,17 @@ class Namespaces:
 
     def _ip(self, role, *words):
         subprocess.run(self.command(role, "ip", *words), check=True, capture_output=True)
+
+    def _limit(self, role, device, kbit):
+        """What exceeds the rate waits for up to two seconds; what would wait for longer is lost. A burst is one frame."""
+        subprocess.run(self.command(role, "tc", "qdisc", "add", "dev", device, "root", "tbf", "rate", f"{kbit}kbit",
+                                    "burst", "1600", "latency", "2s"), check=True, capture_output=True)
+
+    def limits(self, role, towards):
+        """What the limit of that direction has done: its `bytes`, `drops` and `overlimits`."""
+        shown = subprocess.run(self.command(role, "tc", "-s", "-j", "qdisc", "show", "dev", self.devices[role, towards]),
+                               check=True, capture_output=True, text=True).stdout
+        return next(one for one in json.loads(shown) if one["kind"] == "tbf")
 
     def address(self, role, towards):
         return self.addresses[role, towards]
@@ -318,10 +333,10 @@ class Fleet:
         plugins = [self.plugin("fmv")] if plugins is None else plugins
         return Daemon(self, role, name, plugins, "recon", port, more)
 
-    def striker(self, name="strike1", plugins=None, port=0, more=""):
-        """Starts a strike aircraft that also accepts old tracks, so that a busy machine does not cause refusals. In a
+    def striker(self, name="strike1", plugins=None, port=0, more="", seed=1):
+        """Starts a strike aircraft whose sensor sees the traffic of that seed, and that also accepts old tracks, so that a busy machine does not cause refusals. In a
         secured fleet, orders must be signed."""
-        config = f"oldest_s: 60, must_be_signed: {str(self.secured).lower()}"
+        config = f"oldest_s: 60, seed: {seed}, must_be_signed: {str(self.secured).lower()}"
         plugins = [f"{{path: {self.plugin('strike')}, config: {{{config}}}}}"] if plugins is None else plugins
         return Daemon(self, "strike", name, plugins, "mission", port, more)
 
