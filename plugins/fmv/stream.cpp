@@ -1,17 +1,23 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "stream.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace fmv {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
 constexpr double gain = 0.1; ///< of the correction: the pointing drifts slowly, and shakes from frame to frame
+constexpr double period_gain = 0.1;
+constexpr int most_unaligned = 50;       ///< two seconds of usual video
+constexpr double least_deviation = 0.01; ///< m and m/s: a track that claims to be exact cannot be fused
 
 // Fewer digits make a message shorter.
 double hundredths(double value) { return std::round(value * 1e2) / 1e2; }
+double deviation(double value) { return std::max(hundredths(value), least_deviation); }
 double to_a_centimetre(double degrees) { return std::round(degrees * 1e7) / 1e7; }
 
 } // namespace
@@ -32,21 +38,24 @@ void stream::begin(const camera_message& first) {
     map_.emplace(map{.plane = plane,
                      .grid = ground_grid{from, size_},
                      .deviation = geo::ground_deviation(from, first.position_sigma, first.pointing_sigma * degree)});
+    correction_ = {};
+    unaligned_ = 0;
+    still_ = background{size_};
+    tracker_.forget();
 }
 
-void stream::take(const grey& frame, const camera_message& from, double utc) {
-    const bool first = !map_;
-    if (first) {
-        begin(from);
-    }
-    interval_ = utc - utc_.value_or(utc);
-    utc_ = utc;
+std::optional<rectified> stream::aligned(const grey& frame, const camera_message& from) {
     auto picture = map_->grid.rectify(frame, to_camera(from, size_, map_->plane), correction_);
-    if (!first) {
-        const auto off = register_with(still_.reference(), picture, size_);
-        align(picture, size_, off);
-        correction_ = {.x = correction_.x + gain * off.dx, .y = correction_.y + gain * off.dy};
+    const auto off = register_with(still_.reference(), picture, size_);
+    if (!off) {
+        return std::nullopt;
     }
+    align(picture, size_, *off);
+    correction_ = {.x = correction_.x + gain * off->dx, .y = correction_.y + gain * off->dy};
+    return picture;
+}
+
+void stream::watch(rectified picture) {
     still_.complete(picture.pixels, picture.seen);
     if (!still_.known()) {
         still_.learn(picture.pixels);
@@ -54,6 +63,25 @@ void stream::take(const grey& frame, const camera_message& from, double utc) {
     }
     tracker_.step(detector_.look(picture.pixels, still_.values()), interval_);
     still_.follow(picture.pixels, detector_.moving());
+}
+
+void stream::take(const grey& frame, const camera_message& from, double utc) {
+    interval_ = utc - utc_.value_or(utc);
+    period_ = period_ == 0 ? interval_ : period_ + period_gain * (interval_ - period_);
+    utc_ = utc;
+    if (map_) {
+        if (auto picture = aligned(frame, from)) {
+            unaligned_ = 0;
+            watch(std::move(*picture));
+            return;
+        }
+        if (still_.known() && ++unaligned_ <= most_unaligned) {
+            tracker_.step({}, interval_);
+            return;
+        }
+    }
+    begin(from);
+    watch(map_->grid.rectify(frame, to_camera(from, size_, map_->plane), correction_));
 }
 
 std::vector<track> stream::tracks() const {
@@ -66,8 +94,8 @@ std::vector<track> stream::tracks() const {
                        .lon = to_a_centimetre(at.lon),
                        .ve = hundredths(velocity.east),
                        .vn = hundredths(velocity.north),
-                       .sigma = hundredths(map_->deviation),
-                       .sigma_v = hundredths(tracker::velocity_deviation(interval_) * map_->grid.cell()),
+                       .sigma = deviation(std::hypot(map_->deviation, tracker::place_deviation * map_->grid.cell())),
+                       .sigma_v = deviation(tracker::velocity_deviation(period_) * map_->grid.cell()),
                        .age = hundredths(t.age),
                        .missed = t.missed});
     }

@@ -20,6 +20,9 @@ geo::camera to_camera(const camera_message& what, extent size, const geo::tangen
 ///
 /// What the camera reports wrongly about its position and direction moves all places alike: alignment makes the error
 /// of the first frame that of all, so it remains the same.
+///
+/// A frame that cannot be aligned, such as one of a cloud, shows nothing: targets move on as predicted, and are given
+/// up soon. After many such frames, and while the background is not known, the stream begins anew.
 class stream {
   public:
     explicit stream(extent size) : size_(size), still_(size), detector_(size) {}
@@ -42,11 +45,15 @@ class stream {
     };
 
     void begin(const camera_message& first);
+    std::optional<rectified> aligned(const grey& frame, const camera_message& from);
+    void watch(rectified picture);
 
     extent size_;
     std::optional<map> map_;
     std::optional<double> utc_;
     double interval_ = 0; ///< between the last two frames, s
+    double period_ = 0;   ///< the same, smoothed
+    int unaligned_ = 0;   ///< frames since the last one that could be aligned
     point correction_{};  ///< of what the camera reports now, in squares
     background still_;
     detector detector_;

@@ -13,7 +13,7 @@ constexpr double gate = 6;              ///< pixels from where it is predicted
 constexpr double young_gate = 8;        ///< while its velocity is not known
 constexpr double usual_interval = 0.04; ///< s, between frames: for larger ones the gates are wider
 constexpr double most_wider = 3;
-constexpr double place_deviation = 0.4; ///< pixels, of a detection
+constexpr double least_apart = usual_interval / 2; ///< s: noise over a moment is no velocity
 constexpr double alpha = 0.5;
 constexpr double beta = 0.2;
 constexpr int least_hits = 6;        ///< M
@@ -47,7 +47,7 @@ void tracker::predict(double seconds) {
 // The nearest pairs first; those that are confirmed have the first choice.
 void tracker::associate(std::span<const detection> seen, double seconds) {
     const double wider = std::clamp(seconds / usual_interval, 1.0, most_wider);
-    const double apart = std::max(seconds, usual_interval / 2); // noise over a moment is no velocity
+    const double apart = std::max(seconds, least_apart);
     std::vector<std::tuple<bool, double, std::size_t, std::size_t>> pairs;
     for (std::size_t i = 0; i < all_.size(); ++i) {
         for (std::size_t k = 0; k < seen.size(); ++k) {
@@ -93,7 +93,8 @@ void tracker::judge() {
 
 // Of an alpha-beta filter in its steady state (Kalata, "The tracking index", 1984).
 double tracker::velocity_deviation(double seconds) {
-    return place_deviation * std::sqrt(2 * beta * beta / (alpha * (4 - 2 * alpha - beta))) / seconds;
+    return place_deviation * std::sqrt(2 * beta * beta / (alpha * (4 - 2 * alpha - beta))) /
+           std::max(seconds, least_apart);
 }
 
 std::vector<tracked> tracker::confirmed() const {

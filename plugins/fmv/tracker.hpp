@@ -27,8 +27,12 @@ struct tracked {
 /// moved, is confirmed; noise does the first seldom, and what a false background shows does not do the second.
 class tracker {
   public:
+    static constexpr double place_deviation = 0.4; ///< pixels, of a detection, per axis: standard deviation
+
     /// The detections of the frame that was taken so many seconds after the last one. \pre more than 0
     void step(std::span<const detection> seen, double seconds);
+    /// Gives all targets up. Numbers are not used again.
+    void forget() noexcept { all_.clear(); }
     /// Those that are confirmed.
     [[nodiscard]] std::vector<tracked> confirmed() const;
     /// The standard deviation of a velocity, per axis, after many frames that are so many seconds apart: pixels per

@@ -75,7 +75,7 @@ BOOST_AUTO_TEST_CASE(of_many_scenes_nine_of_ten_vehicles_are_found_and_few_that_
     BOOST_TEST(sum.vehicles > sum.frames); // several in each
     BOOST_TEST(sum.found / sum.vehicles >= 0.9);
     BOOST_TEST(sum.false_tracks / sum.frames <= 0.1);
-    // The error of a place is the same in all frames of a scene: so these are few.
+    // The error of a place is the same in all frames of a scene: there are as few samples as scenes.
     BOOST_TEST(std::sqrt(sum.place_squares) < (CLES_DETECTION_IS_SLOW ? 3 : 1.5) * std::sqrt(sum.sigma_squares));
     BOOST_TEST(std::sqrt(sum.velocity_squares) < 1.5 * std::sqrt(sum.sigma_v_squares));
 }
@@ -99,6 +99,48 @@ BOOST_AUTO_TEST_CASE(it_finds_nothing_before_it_knows_what_stands_still) {
         BOOST_TEST(video.tracks().empty());
     }
     BOOST_TEST(video.ready());
+}
+
+// While the camera shows something else, all of a map would move with it, and then tracks were elsewhere.
+BOOST_AUTO_TEST_CASE(after_the_camera_saw_nothing_tracks_are_where_they_were) {
+    const auto& size = jadc2::scene::size;
+    const fmv::grey cloud(size.pixels(), 120);
+    for (const bool looks_away : {true, false}) {
+        for (const int frames_without : {25, 60}) { // with the second, the stream begins anew
+            const jadc2::scene ground{3};
+            fmv::stream video{size};
+            jadc2::track_evaluation before{ground};
+            jadc2::track_evaluation after{ground};
+            before.begin(0, 0);
+            std::uint64_t number = 0;
+            const auto take = [&](bool sees) {
+                const double utc = static_cast<double>(number) * 0.04;
+                auto camera = ground.reported(utc);
+                camera.azimuth += !sees && looks_away ? 90 : 0;
+                video.take(sees ? ground.frame(number, utc) : cloud, camera, utc);
+                ++number;
+                return utc;
+            };
+            for (int i = 0; i < 60; ++i) {
+                before.add(take(true), video.tracks(), video.ready());
+            }
+            BOOST_TEST(before.found().recall() >= 0.9);
+            for (int i = 0; i < frames_without; ++i) {
+                take(false);
+            }
+            BOOST_TEST(video.tracks().empty());
+            const double back = take(true);
+            after.begin(number, back);
+            for (int i = 0; i < 60; ++i) {
+                const double utc = take(true);
+                after.add(utc, video.tracks(), video.ready() && i > 15);
+            }
+            BOOST_TEST_MESSAGE("away for " << frames_without << " frames: off by " << before.place_error()
+                                           << " m, then " << after.place_error() << " m");
+            BOOST_TEST(after.found().recall() >= 0.9);
+            BOOST_TEST(after.place_error() < before.place_error() + 1);
+        }
+    }
 }
 
 // The aircraft flies a part of its circle, so that all of the picture turns, and the wrong direction of its camera

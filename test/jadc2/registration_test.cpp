@@ -62,6 +62,31 @@ BOOST_AUTO_TEST_CASE(what_was_not_seen_does_not_count) {
     BOOST_TEST((fmv::register_with(picture_from(0, 0).pixels, picture, size) == fmv::shift{-1, 3}));
 }
 
+BOOST_AUTO_TEST_CASE(a_change_of_light_does_not_mislead) {
+    auto picture = picture_from(3, 1);
+    for (auto& pixel : picture.pixels) {
+        pixel = static_cast<std::uint8_t>(pixel - 40);
+    }
+    BOOST_TEST((fmv::register_with(picture_from(0, 0).pixels, picture, size) == fmv::shift{3, 1}));
+}
+
+BOOST_AUTO_TEST_CASE(without_anything_to_tell_it_by_there_is_no_shift) {
+    const auto reference = picture_from(0, 0).pixels;
+    const fmv::rectified uniform{.pixels = fmv::grey(size.pixels(), 90), .seen = fmv::grey(size.pixels(), 1)};
+    BOOST_TEST(!fmv::register_with(reference, uniform, size));
+    BOOST_TEST(!fmv::register_with(uniform.pixels, uniform, size));
+    BOOST_TEST(!fmv::register_with(reference, picture_from(5000, 5000), size)); // another place
+    auto picture = picture_from(1, 1);
+    picture.seen.assign(size.pixels(), 0);
+    BOOST_TEST(!fmv::register_with(reference, picture, size));
+    for (int y = 0; y < size.height; ++y) {
+        for (int x = 0; x < size.width / 3; ++x) {
+            picture.seen[size.at(x, y)] = 1;
+        }
+    }
+    BOOST_TEST((fmv::register_with(reference, picture, size) == fmv::shift{1, 1}));
+}
+
 BOOST_AUTO_TEST_CASE(an_aligned_picture_is_the_reference_where_it_was_seen) {
     const auto reference = picture_from(0, 0).pixels;
     for (const auto by : {fmv::shift{0, 0}, fmv::shift{3, -2}, fmv::shift{-4, 4}}) {
