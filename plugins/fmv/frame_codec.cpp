@@ -3,7 +3,7 @@
 
 #include "base64.hpp"
 
-#if CLES_FMV_JPEG
+#if CLES_JPEG
 #include <memory>
 
 #include <turbojpeg.h>
@@ -15,7 +15,7 @@
 
 namespace fmv {
 
-#if CLES_FMV_JPEG
+#if CLES_JPEG
 
 namespace {
 

@@ -3,9 +3,19 @@
 
 namespace fmv {
 
-std::shared_ptr<kept_stream> streams::find(const std::string& name, extent size, time_point now) {
+std::shared_ptr<kept_stream> streams::find(const std::string& name, time_point now) {
     const std::scoped_lock guard{lock_};
     std::erase_if(all_, [&](const auto& one) { return now - one.second.used > idle_; });
+    const auto at = all_.find(name);
+    if (at == all_.end()) {
+        return nullptr;
+    }
+    at->second.used = now;
+    return at->second.what;
+}
+
+std::shared_ptr<kept_stream> streams::begin(const std::string& name, extent size, time_point now) {
+    const std::scoped_lock guard{lock_};
     auto at = all_.find(name);
     if (at == all_.end()) {
         if (all_.size() >= most_) {
@@ -13,7 +23,6 @@ std::shared_ptr<kept_stream> streams::find(const std::string& name, extent size,
         }
         at = all_.emplace(name, entry{.what = std::make_shared<kept_stream>(size), .used = now}).first;
     }
-    at->second.used = now;
     return at->second.what;
 }
 

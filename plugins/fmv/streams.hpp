@@ -30,9 +30,12 @@ class streams {
 
     streams(std::size_t most, std::chrono::milliseconds idle) : most_(most), idle_(idle) {}
 
-    /// The stream of that name, which begins where there is none; null where there are too many.
-    std::shared_ptr<kept_stream> find(const std::string& name, extent size, time_point now);
+    /// The stream of that name; null, if there is none.
+    std::shared_ptr<kept_stream> find(const std::string& name, time_point now);
+    /// A new stream, or the one that another thread has begun meanwhile; null, if there are too many.
+    std::shared_ptr<kept_stream> begin(const std::string& name, extent size, time_point now);
     [[nodiscard]] std::size_t count() const;
+    [[nodiscard]] std::size_t most() const noexcept { return most_; }
 
   private:
     struct entry {

@@ -12,7 +12,10 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
+#include <utility>
 
 namespace fmv {
 namespace {
@@ -69,7 +72,7 @@ extent checked(const frame_message& what) {
     }
     require(what.format == "grey" || what.format == "jpeg", "format: grey or jpeg");
     require(what.format == "grey" || has_jpeg(),
-            "format: this node is built without libjpeg-turbo, and takes only grey");
+            "format: this node is built without libjpeg-turbo, and takes only grey (recon --format grey)");
     require(is_within(what.utc, 0, 1e11), "utc: seconds since 1970");
     check(what.camera);
     return size;
@@ -86,13 +89,15 @@ grey decoded(const frame_message& what, extent size) {
     return std::move(*pixels);
 }
 
-found look(kept_stream& at, const frame_message& what, const grey& frame, shop& counts) {
+// \param picture nothing, if it has not been decoded yet
+found look(kept_stream& at, const frame_message& what, extent size, std::optional<grey> picture, shop& counts) {
+    require(at.video.size() == size, "the stream began with frames of another size");
     found out{.frame = what.frame};
     if (what.frame < at.next) {
         ++counts.repeated;
     } else {
         require(!at.video.utc() || what.utc > *at.video.utc(), "utc: later than that of the frame before");
-        at.video.take(frame, what.camera, what.utc);
+        at.video.take(picture ? *picture : decoded(what, size), what.camera, what.utc);
         at.next = what.frame + 1;
         ++counts.frames;
     }
@@ -107,9 +112,13 @@ void process(const cles::request& asked, const cles::responder& answer, shop& he
     try {
         const auto what = asked.as<frame_message>();
         const auto size = checked(what);
-        const auto pixels = decoded(what, size);
-        const auto at = here.all.find(what.stream, size, begun);
-        if (!at) {
+        auto at = here.all.find(what.stream, begun);
+        std::optional<grey> first;
+        if (!at && here.all.count() < here.all.most()) {
+            first = decoded(what, size); // what is no picture begins no stream
+            at = here.all.begin(what.stream, size, begun);
+        }
+        if (!at) { // decoding takes long: not for what is refused
             ++here.refused;
             answer.refuse("the limit of streams is reached", std::chrono::seconds{1});
             return;
@@ -120,8 +129,7 @@ void process(const cles::request& asked, const cles::responder& answer, shop& he
             answer.refuse("the stream's last frame is still being processed", std::chrono::milliseconds{5});
             return;
         }
-        require(at->video.size() == size, "the stream began with frames of another size");
-        auto out = look(*at, what, pixels, here);
+        auto out = look(*at, what, size, std::move(first), here);
         mine.unlock(); // the next frame may come as soon as this one is answered
         out.node = asked.node();
         const auto whole = milliseconds{static_cast<double>(what.deadline_ms)};

@@ -99,6 +99,26 @@ BOOST_AUTO_TEST_CASE(streams_are_apart_and_no_more_than_so_many) {
     BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":2,"frames":2,"repeated":0,"refused":1,"bad":0})");
 }
 
+// Decoding takes a worker's time.
+BOOST_AUTO_TEST_CASE(what_is_refused_or_known_is_not_decoded) {
+    send(frame(0));
+    send(frame(0, "b"));
+    auto what = frame(0, "c");
+    what.picture = "no picture";
+    BOOST_TEST(send(what) == "busy: node: the limit of streams is reached");
+    what = frame(0);
+    what.picture = "no picture";
+    BOOST_TEST(cles::from_json<fmv::found>(send(what)).frame == 0U);
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":2,"frames":2,"repeated":1,"refused":1,"bad":0})");
+}
+
+BOOST_AUTO_TEST_CASE(what_is_no_picture_begins_no_stream) {
+    auto what = frame(0);
+    what.picture = "no picture";
+    BOOST_TEST(send(what).starts_with("bad_request: node: picture: "));
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":0,"frames":0,"repeated":0,"refused":0,"bad":1})");
+}
+
 BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     auto what = frame(0);
     what.picture.pop_back();
@@ -113,7 +133,7 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     BOOST_TEST(send(what) == (fmv::has_jpeg()
                                   ? "bad_request: node: picture: not the base64 of a JPEG of 320 x 240 pixels"
                                   : "bad_request: node: format: this node is built without libjpeg-turbo, "
-                                    "and takes only grey"));
+                                    "and takes only grey (recon --format grey)"));
     for (const auto& [width, height] : {std::pair{63, 240}, {240, -1}, {1025, 240}, {1024, 1024}}) {
         what = frame(0);
         what.width = width;
@@ -171,10 +191,14 @@ BOOST_AUTO_TEST_CASE(a_stream_that_is_idle_is_forgotten) {
     using namespace std::chrono_literals;
     const auto now = std::chrono::steady_clock::time_point{} + 1h;
     fmv::streams all{1, 10s};
-    const auto first = all.find("a", scene::size, now);
-    BOOST_TEST((all.find("a", scene::size, now + 9s) == first));
-    BOOST_TEST((all.find("b", scene::size, now + 18s) == nullptr));
-    BOOST_TEST((all.find("b", scene::size, now + 20s) != nullptr));
+    BOOST_TEST((all.find("a", now) == nullptr));
+    const auto first = all.begin("a", scene::size, now);
+    BOOST_TEST((all.begin("a", scene::size, now) == first));
+    BOOST_TEST((all.find("a", now + 9s) == first));
+    BOOST_TEST((all.find("b", now + 18s) == nullptr));
+    BOOST_TEST((all.begin("b", scene::size, now + 18s) == nullptr));
+    BOOST_TEST((all.find("b", now + 20s) == nullptr));
+    BOOST_TEST((all.begin("b", scene::size, now + 20s) != nullptr));
     BOOST_TEST(all.count() == 1U);
 }
 
