@@ -334,8 +334,8 @@ class Fleet:
         return Daemon(self, role, name, plugins, "recon", port, more)
 
     def striker(self, name="strike1", plugins=None, port=0, more="", seed=1):
-        """Starts a strike aircraft whose sensor sees the traffic of that seed, and that also accepts old tracks, so that a busy machine does not cause refusals. In a
-        secured fleet, orders must be signed."""
+        """Starts a strike aircraft whose sensor sees the traffic of that seed, and that also accepts old tracks, so that a
+        busy machine does not cause refusals. In a secured fleet, orders must be signed."""
         config = f"oldest_s: 60, seed: {seed}, must_be_signed: {str(self.secured).lower()}"
         plugins = [f"{{path: {self.plugin('strike')}, config: {{{config}}}}}"] if plugins is None else plugins
         return Daemon(self, "strike", name, plugins, "mission", port, more)

@@ -110,7 +110,8 @@ CLI::App* add_recon(CLI::App& app, jadc2::recon_options& args) {
         ->type_name("DIR");
     r->add_option("-s,--satellite", args.satellites, "A node that processes video (tcp://127.0.0.1:25370)")
         ->type_name("URL");
-    r->add_option("--seed", args.seed, "Seed of the scene (1)");
+    r->add_option("--seed", args.seed, "Seed of the scene; the strike aircraft's sensor has to have the same (1)")
+        ->check(CLI::NonNegativeNumber);
     add_format(*r, args.format);
     r->add_option("--fps", args.fps, "Frames per second (25)")->check(CLI::Range(0.1, 200.0));
     r->add_option("--frames", args.frames, "Frames after which it ends; 0: no limit (0)");
@@ -151,10 +152,10 @@ CLI::App* add_drill(CLI::App& app, jadc2::drill_options& args) {
 CLI::App* add_rehearse(CLI::App& app, jadc2::rehearsal_options& args) {
     auto* r = app.add_subcommand("rehearse", "Measures how many strikes hit, in simulated time and without a network");
     r->add_option("-n,--strikes", args.strikes, "Strikes (100)")->check(CLI::Range(1, 100'000));
-    r->add_option("--seed", args.seed, "Seed of the first scene (1)");
+    r->add_option("--seed", args.seed, "Seed of the first scene (1)")->check(CLI::NonNegativeNumber);
     r->add_option("--scans", args.scans, "Scans of the strike aircraft's sensor that are fused with the track (30)")
-        ->check(CLI::Range(0, 100));
-    r->add_option("--delay", args.delay_s, "Seconds from the frame to the release (0.3)")->check(CLI::Range(0.0, 60.0));
+        ->check(CLI::Range(0, 30));
+    r->add_option("--delay", args.delay_s, "Seconds from the frame to the release (0.3)")->check(CLI::Range(0.0, 2.0));
     return r;
 }
 
@@ -163,7 +164,7 @@ CLI::App* add_load(CLI::App& app, jadc2::load_options& args) {
     l->add_option("--at", args.at, "Address of the node (tcp://127.0.0.1:25370)")->type_name("URL");
     l->add_option("--streams", args.streams, "Number of parallel streams (4)")->check(CLI::Range(1, 64));
     l->add_option("--duration", args.duration_s, "Seconds; 0: until it is stopped (5)")->check(CLI::Range(0.0, 3600.0));
-    l->add_option("--seed", args.seed, "Seed of the scene (1)");
+    l->add_option("--seed", args.seed, "Seed of the scene (1)")->check(CLI::NonNegativeNumber);
     add_format(*l, args.format);
     return l;
 }

@@ -218,7 +218,8 @@ boost::asio::awaitable<void> mission::assess(story record) {
                     "order " + what.order + (seen.hit ? " hits" : " misses") + ": " + fixed(seen.missed_by, 1) +
                         " m from the " + (seen.is_target ? "target" : "nearest vehicle") + ", " +
                         fixed(what.flight_s, 2) + " s after its release; " + std::to_string(what.plots) + " plots of " +
-                        what.node + " were fused with the track",
+                        what.node + " were fused with the track" +
+                        (what.plots == 0 ? ": is the seed of its sensor that of " + args_.recon_name + "?" : ""),
                     seen);
     } catch (const cles::error& e) {
         events_.log("assessed", "order " + what.order + ": not seen: " + e.what());

@@ -52,11 +52,11 @@ struct summary {
     double false_per_frame = 0;
     double place_error = 0;    ///< m, per axis, root mean square
     double velocity_error = 0; ///< m/s, the same
-    double frame_bytes = 0;    ///< of a frame as it is sent, mean
+    double picture_bytes = 0;  ///< of a frame's picture in base64, mean
     medians median{};
 };
 BOOST_DESCRIBE_STRUCT(summary, (),
-                      (frames, judged, recall, false_per_frame, place_error, velocity_error, frame_bytes, median))
+                      (frames, judged, recall, false_per_frame, place_error, velocity_error, picture_bytes, median))
 
 double microseconds(double ms) { return std::round(ms * 1000) / 1000; } // fewer digits make a message shorter
 
@@ -211,6 +211,10 @@ std::string recon::explain(const cles::error& why) const {
 }
 
 assessment recon::assess(const impact& at) const {
+    if (!(std::abs(at.lat) <= 89 && std::abs(at.lon) <= 180 && std::abs(at.utc) <= 1e11)) { // false for NaN, too
+        throw cles::error(cles::errc::bad_request,
+                          "lat, lon and utc: degrees, -89 to 89 and -180 to 180, and seconds since 1970");
+    }
     const auto place = scene::plane().to_plane({.lat = at.lat, .lon = at.lon});
     std::vector<double> distances;
     for (const auto& vehicle : scene_.truth(at.utc)) {
@@ -229,8 +233,8 @@ void recon::report() const {
                       .false_per_frame = evaluation_.found().false_per_frame(),
                       .place_error = evaluation_.place_error(),
                       .velocity_error = evaluation_.velocity_error(),
-                      .frame_bytes = static_cast<double>(picture_bytes_) /
-                                     static_cast<double>(std::max<std::uint64_t>(1, all.done + all.failed)),
+                      .picture_bytes = static_cast<double>(picture_bytes_) /
+                                       static_cast<double>(std::max<std::uint64_t>(1, all.done + all.failed)),
                       .median = {.encode_ms = median_of(times_, &picture::encode_ms),
                                  .way_ms = median_of(times_, &picture::way_ms),
                                  .queue_ms = median_of(times_, &picture::queue_ms),

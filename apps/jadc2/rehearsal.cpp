@@ -13,7 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -27,6 +27,7 @@ constexpr std::uint64_t frames = fmv::background::learning + 40;
 constexpr std::size_t per_scene = 3;
 constexpr double least_age = 0.6;           // s
 constexpr std::uint64_t scenes_at_most = 3; // for each strike
+constexpr std::uint64_t begins = 100'000;   // of scenes, 1000 s apart: later ones repeat, so that times stay exact
 
 struct rehearsed_target {
     fmv::track track{};
@@ -65,44 +66,51 @@ strike::order order_for(const fmv::track& t, double utc) {
             .utc = utc};
 }
 
-// How far a weapon misses, and how far it is expected to.
+// How far a weapon misses, and how far it is expected to, m.
 struct miss {
     double by = 0;
     double sigma = 0;
 };
 
-miss released(const scene& ground, std::uint64_t seed, const rehearsed_target& target, double utc, double delay_s,
-              std::uint64_t scans) {
+// Nothing, if there is no aim.
+std::optional<miss> released(const scene& ground, std::uint64_t seed, const rehearsed_target& target, double utc,
+                             double delay_s, std::uint64_t scans) {
     const auto own = strike::default_state(scans);
     strike::own_sensor sensor{seed, own.at};
     const double now = utc + delay_s;
     const auto aimed = strike::engage(order_for(target.track, utc), now, own, sensor);
     if (!aimed) {
-        return {.by = std::numeric_limits<double>::infinity(), .sigma = 0};
+        return std::nullopt;
     }
     const auto truth = ground.truth(now + aimed->after_s)[target.vehicle].at;
     const auto place = scene::plane().to_plane(aimed->at);
-    return {.by = std::hypot(truth.east - place.east, truth.north - place.north), .sigma = aimed->sigma};
+    return miss{.by = std::hypot(truth.east - place.east, truth.north - place.north), .sigma = aimed->sigma};
 }
 
 double quantile(const std::vector<double>& sorted, double part) {
-    return sorted[std::min(sorted.size() - 1, static_cast<std::size_t>(part * static_cast<double>(sorted.size())))];
+    return sorted.empty() ? 0
+                          : sorted[std::min(sorted.size() - 1,
+                                            static_cast<std::size_t>(part * static_cast<double>(sorted.size())))];
 }
 
 class tally {
   public:
-    void add(const miss& one) {
-        missed_.push_back(one.by);
-        expected_ += one.sigma * one.sigma;
-        observed_ += one.by * one.by / 2;
+    void add(const std::optional<miss>& one) {
+        ++strikes_;
+        if (one) {
+            missed_.push_back(one->by);
+            expected_ += one->sigma * one->sigma;
+            observed_ += one->by * one->by / 2;
+        }
     }
-    [[nodiscard]] std::uint64_t strikes() const noexcept { return missed_.size(); }
+    [[nodiscard]] std::uint64_t strikes() const noexcept { return strikes_; }
     [[nodiscard]] strike_record record() const {
         auto sorted = missed_;
         std::sort(sorted.begin(), sorted.end());
         const auto hits = std::upper_bound(sorted.begin(), sorted.end(), effective_radius) - sorted.begin();
-        const auto count = static_cast<double>(sorted.size());
-        return {.strikes = sorted.size(),
+        const auto count = std::max(1.0, static_cast<double>(sorted.size()));
+        return {.strikes = strikes_,
+                .not_aimed = strikes_ - sorted.size(),
                 .hits = static_cast<std::uint64_t>(hits),
                 .median_missed_by = quantile(sorted, 0.5),
                 .p95_missed_by = quantile(sorted, 0.95),
@@ -111,6 +119,7 @@ class tally {
     }
 
   private:
+    std::uint64_t strikes_ = 0;
     std::vector<double> missed_;
     double expected_ = 0, observed_ = 0; ///< sums of squares
 };
@@ -126,7 +135,7 @@ rehearsal_result rehearse(const rehearsal_options& args) {
         }
         const scene ground{seed};
         double utc = 0;
-        const auto targets = film(ground, static_cast<double>(seed) * 1000, utc);
+        const auto targets = film(ground, static_cast<double>(seed % begins) * 1000, utc);
         for (const auto& each : targets) {
             if (fused.strikes() < args.strikes) {
                 fused.add(released(ground, seed, each, utc, args.delay_s, args.scans));

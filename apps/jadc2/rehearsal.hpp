@@ -17,6 +17,7 @@ struct rehearsal_options {
 /// How well strikes went.
 struct strike_record {
     std::uint64_t strikes = 0;
+    std::uint64_t not_aimed = 0; ///< because the target is too fast; the members below are of the others
     std::uint64_t hits = 0;      ///< within `effective_radius` of the vehicle that was meant
     double median_missed_by = 0; ///< m
     double p95_missed_by = 0;    ///< m
@@ -24,7 +25,7 @@ struct strike_record {
     double observed_sigma = 0;   ///< m, the same, as it is in truth
 };
 BOOST_DESCRIBE_STRUCT(strike_record, (),
-                      (strikes, hits, median_missed_by, p95_missed_by, expected_sigma, observed_sigma))
+                      (strikes, not_aimed, hits, median_missed_by, p95_missed_by, expected_sigma, observed_sigma))
 
 /// The same strikes in both ways.
 struct rehearsal_result {

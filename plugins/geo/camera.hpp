@@ -31,11 +31,11 @@ class projection {
     [[nodiscard]] std::optional<plane_position> to_ground(image_position at) const noexcept {
         const double across = at.x - from_.centre_x;
         const double down = at.y - from_.centre_y;
-        const double falls = axis_.down * from_.focal_length + rows_.down * down;
-        if (!(falls > 0)) {
+        const double descent = axis_.down * from_.focal_length + rows_.down * down;
+        if (!(descent > 0)) {
             return std::nullopt;
         }
-        const double scale = from_.height / falls;
+        const double scale = from_.height / descent;
         return plane_position{.east = from_.at.east + scale * (axis_.east * from_.focal_length +
                                                                columns_.east * across + rows_.east * down),
                               .north = from_.at.north + scale * (axis_.north * from_.focal_length +

@@ -10,9 +10,9 @@ namespace geo {
 namespace {
 
 constexpr int roads = 10;
-constexpr double apart = 10;      // m, from a road to the next
-constexpr double pulsation = 0.4; // rad/s, of the speed
-constexpr double stretch = 1.5;   // m, of the variation of the place: so 0.6 m/s, and 0.24 m/s² at most
+constexpr double apart = 10;         // m, from a road to the next
+constexpr double angular_rate = 0.4; // rad/s, of the variation of the speed
+constexpr double amplitude = 1.5;    // m, of the variation of the place: so 0.6 m/s, and 0.24 m/s² at most
 
 } // namespace
 
@@ -35,11 +35,11 @@ traffic::traffic(std::uint64_t seed) {
 std::vector<traffic::motion> traffic::at(double utc) const {
     std::vector<motion> all;
     for (const auto& each : courses_) {
-        const double turn = pulsation * utc + each.phase;
-        const double travelled = each.start + each.speed * utc + stretch * std::sin(turn) + half_road;
+        const double turn = angular_rate * utc + each.phase;
+        const double travelled = each.start + each.speed * utc + amplitude * std::sin(turn) + half_road;
         const double whole = 2 * half_road;
         const double place = travelled - whole * std::floor(travelled / whole) - half_road;
-        const double speed = each.speed + stretch * pulsation * std::cos(turn);
+        const double speed = each.speed + amplitude * angular_rate * std::cos(turn);
         all.push_back({.at = {.east = along_.east * place + along_.north * each.aside,
                               .north = along_.north * place - along_.east * each.aside},
                        .velocity = {.east = along_.east * speed, .north = along_.north * speed}});

@@ -76,7 +76,7 @@ hypothesis follow(std::span<const scan> scans, std::size_t begin, const plot& fi
 
 // The plots of the target, oldest first. It begins with the newest scan, which is next to the time of the track, where
 // the target is known best; and goes on with older ones, because the target may have been missed. There may be several
-// vehicles near the track. Those with fewer plots than half of the scans are none, or move differently.
+// vehicles near the track. What has plots in less than half of the scans is false, or moves differently.
 std::vector<sighting> plots_of(std::span<const scan> scans, const order& what, const target_filter& track) {
     constexpr std::size_t enough = 3;
     hypothesis best;

@@ -16,10 +16,10 @@ covariance inverse(const covariance& of) {
 
 } // namespace
 
-target_filter::target_filter(geo::plane_position at, geo::plane_position velocity, double place, double moving)
+target_filter::target_filter(geo::plane_position at, geo::plane_position velocity, double sigma, double sigma_v)
     : x_{at.east, at.north, velocity.east, velocity.north} {
-    p_[0][0] = p_[1][1] = place * place;
-    p_[2][2] = p_[3][3] = moving * moving;
+    p_[0][0] = p_[1][1] = sigma * sigma;
+    p_[2][2] = p_[3][3] = sigma_v * sigma_v;
 }
 
 void target_filter::predict(double seconds) {

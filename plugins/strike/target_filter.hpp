@@ -15,8 +15,8 @@ struct covariance {
 /// A target that moves at a nearly constant velocity: a Kalman filter, in which the acceleration is white noise.
 class target_filter {
   public:
-    /// \param place its standard deviation per axis, m \param moving the same of the velocity, m/s
-    target_filter(geo::plane_position at, geo::plane_position velocity, double place, double moving);
+    /// \param sigma standard deviation of the place per axis, m \param sigma_v the same of the velocity, m/s
+    target_filter(geo::plane_position at, geo::plane_position velocity, double sigma, double sigma_v);
 
     /// To the time `seconds` later, or earlier if they are negative.
     void predict(double seconds);

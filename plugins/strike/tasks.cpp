@@ -121,7 +121,7 @@ void settings::check() const {
     require(std::abs(lat.value_or(0)) <= 89, "lat", "lat: -89 to 89 degrees");
     require(std::abs(lon.value_or(0)) <= 180, "lon", "lon: -180 to 180 degrees");
     require(height.value_or(0) >= 0 && height.value_or(0) <= 50'000, "height", "height: 0 to 50000 m");
-    require(scans.value_or(0) <= 100, "scans", "scans: 100 at most");
+    require(scans.value_or(0) <= 30, "scans", "scans: 30 at most"); // the search takes its time on the I/O thread
     require(speed.value_or(400) > 0 && std::isfinite(speed.value_or(400)), "speed", "speed: more than 0");
     require(oldest_s.value_or(2) > 0 && std::isfinite(oldest_s.value_or(2)), "oldest_s", "oldest_s: more than 0");
 }

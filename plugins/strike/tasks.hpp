@@ -16,8 +16,8 @@ struct settings {
     std::optional<double> height{};         ///< the same, in m above the ground; 600 unless set
     std::optional<double> speed{};          ///< of what it releases, in m/s; 400 unless set
     std::optional<double> oldest_s{};       ///< a track that is older is refused; 2 unless set
-    std::optional<std::uint64_t> scans{};   ///< of its own sensor, fused with a track; 0 to 100, 30 unless set
-    std::optional<std::uint64_t> seed{};    ///< of the traffic that its sensor sees; 1 unless set
+    std::optional<std::uint64_t> scans{};   ///< of its own sensor, fused with a track; 0 to 30, 30 unless set
+    std::optional<std::uint64_t> seed{};    ///< of the traffic that its sensor sees, as of recon; 1 unless set
     std::optional<bool> must_be_signed{};   ///< orders run only with the requester's signature; false unless set
 
     /// \throws cles::setting_error

@@ -47,8 +47,9 @@ BOOST_AUTO_TEST_CASE(of_a_hundred_strikes_most_hit_with_fusion_and_many_miss_wit
         BOOST_TEST(record.strikes == strikes);
         BOOST_TEST(record.observed_sigma < 1.5 * record.expected_sigma); // it knows how accurate it is
     }
-    BOOST_TEST(static_cast<double>(fused.hits) >= 0.95 * static_cast<double>(strikes));
-    constexpr double most = CLES_DETECTION_IS_SLOW ? 0.95 : 0.7; // of a few, more may hit by chance
+    // Of a few, more may miss or hit by chance.
+    BOOST_TEST(static_cast<double>(fused.hits) >= (CLES_DETECTION_IS_SLOW ? 0.9 : 0.95) * static_cast<double>(strikes));
+    constexpr double most = CLES_DETECTION_IS_SLOW ? 0.95 : 0.7;
     BOOST_TEST(static_cast<double>(alone.hits) <= most * static_cast<double>(strikes));
 }
 

@@ -5,6 +5,7 @@
     missing_test.py PROGRAMS
 """
 
+import json
 import os
 import signal
 import socket
@@ -101,8 +102,9 @@ class Missing(unittest.TestCase):
         self.assertIn("insecure", err)
 
     def test_wrong_usage(self):
-        for arguments in ([], ["nonsense"], ["recon", "--fps", "0"], ["mission", "--strikes", "0"], ["recon", "--seed", "x"],
-                          ["load", "--streams", "65"], ["mission", "--duration", "-1"]):
+        for arguments in ([], ["nonsense"], ["recon", "--fps", "0"], ["mission", "--strikes", "0"], ["recon", "--seed", "x"], ["recon", "--seed", "-1"],
+                          ["load", "--streams", "65"], ["mission", "--duration", "-1"], ["rehearse", "--scans", "31"],
+                          ["rehearse", "--delay", "2.1"], ["rehearse", "--strikes", "0"], ["rehearse", "--seed", "-1"]):
             code, out, err = run(*arguments)
             self.assertEqual((code, out), (2, ""), arguments)
             self.assertNotEqual(err, "")
@@ -110,6 +112,24 @@ class Missing(unittest.TestCase):
             code, _, err = run(*arguments, *(["--listen", "tcp://127.0.0.1:0"] if arguments[0] == "recon" else []))
             self.assertEqual(code, 5, arguments)
             self.assertIn("nonsense", err)
+
+    def test_rehearsing(self):
+        for seed in ("1", "18446744073709551615"):
+            code, out, err = run("rehearse", "--strikes", "3", "--seed", seed)
+            self.assertEqual((code, err), (0, ""))
+            for record in json.loads(out).values():
+                self.assertEqual((record["strikes"], record["not_aimed"]), (3, 0))
+                self.assertGreater(record["expected_sigma"], 0)
+                self.assertLess(record["median_missed_by"], 20)
+
+    def test_an_impact_that_is_nowhere(self):
+        recon = self.fleet.recon([self.fleet.satellite()])
+        for body in ('{"by":"","target":0,"lat":null,"lon":0,"utc":0}', '{"by":"","target":0,"lat":0,"lon":1e308,"utc":0}'):
+            done = subprocess.run([os.path.join(PROGRAMS, "cles"), "push", "self:impact", "-d", body, "--at", recon.url],
+                                  stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=60, check=False,
+                                  env={**clean_environment(), "CLES_MULTICAST": "off"})
+            self.assertEqual((done.returncode, done.stdout), (5, ""))
+            self.assertIn("bad_request: recon: lat, lon and utc: degrees", done.stderr)
 
     def test_a_load_of_more_streams_than_are_taken(self):
         satellite = self.fleet.satellite(plugins=[f"{{path: {self.fleet.plugin('fmv')}, config: {{streams: 2}}}}"])

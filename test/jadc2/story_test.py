@@ -76,6 +76,11 @@ class Story(StoryTest):
                               capture_output=True, text=True, timeout=30, check=False)
         self.assertEqual((done.returncode, done.stdout), (2, ""))
         self.assertIn("there is no clesd in /nowhere", done.stderr)
+        for more in (["--kbit", "64"], ["--hosts", "--kbit", "7"]):
+            done = subprocess.run([sys.executable, "-B", SCRIPT, "--programs", PROGRAMS, *more], stdin=subprocess.DEVNULL,
+                                  capture_output=True, text=True, timeout=30, check=False)
+            self.assertEqual((done.returncode, done.stdout), (2, ""))
+            self.assertIn("--kbit: 8 at least, and it needs --hosts", done.stderr)
 
 
 if __name__ == "__main__":

@@ -151,7 +151,7 @@ BOOST_AUTO_TEST_CASE(settings_that_cannot_be) {
     for (const auto& wrong :
          {strike::settings{.weapons = 1001}, strike::settings{.speed = 0}, strike::settings{.oldest_s = -1},
           strike::settings{.lat = std::numeric_limits<double>::quiet_NaN()}, strike::settings{.lon = 181},
-          strike::settings{.height = -1}, strike::settings{.scans = 101}}) {
+          strike::settings{.height = -1}, strike::settings{.scans = 31}}) {
         boost::asio::io_context other;
         cles::service there{other, {.name = "there"}};
         BOOST_CHECK_THROW(strike::register_tasks(there, wrong), cles::error);
