@@ -33,9 +33,19 @@ rectified ground_grid::rectify(const grey& frame, const geo::camera& from, point
     const geo::projection view{from};
     rectified out{.pixels = grey(size_.pixels()), .seen = grey(size_.pixels())};
     const auto below = static_cast<std::size_t>(size_.width);
+    const auto seen_at = [&](double x, double y) {
+        return view.seen(to_ground({.x = x - correction.x, .y = y - correction.y}));
+    };
+    // Of a row, two squares tell all others: what the camera sees is linear in the place.
     for (int y = 0; y < size_.height; ++y) {
+        const auto first = seen_at(0, y);
+        const auto next = seen_at(1, y);
+        const geo::projection::view step{
+            .depth = next.depth - first.depth, .right = next.right - first.right, .down = next.down - first.down};
         for (int x = 0; x < size_.width; ++x) {
-            const auto at = view.to_image(to_ground({.x = x - correction.x, .y = y - correction.y}));
+            const auto at = view.in_image({.depth = first.depth + x * step.depth,
+                                           .right = first.right + x * step.right,
+                                           .down = first.down + x * step.down});
             if (!at || !(at->x >= 0 && at->y >= 0 && at->x < size_.width - 1 && at->y < size_.height - 1)) {
                 continue;
             }

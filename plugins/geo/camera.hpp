@@ -41,18 +41,28 @@ class projection {
                               .north = from_.at.north + scale * (axis_.north * from_.focal_length +
                                                                  columns_.north * across + rows_.north * down)};
     }
-    /// Nothing, for places behind the camera. The result may be outside the picture.
-    [[nodiscard]] std::optional<image_position> to_image(plane_position at) const noexcept {
+    /// Where a place is, seen from the camera, in metres: along the optical axis, and to the right and down in the
+    /// picture. It is linear in the place.
+    struct view {
+        double depth = 0, right = 0, down = 0;
+    };
+    [[nodiscard]] view seen(plane_position at) const noexcept {
         const double east = at.east - from_.at.east;
         const double north = at.north - from_.at.north;
-        const double depth = axis_.east * east + axis_.north * north + axis_.down * from_.height;
-        if (!(depth > 0)) {
+        return {.depth = axis_.east * east + axis_.north * north + axis_.down * from_.height,
+                .right = columns_.east * east + columns_.north * north,
+                .down = rows_.east * east + rows_.north * north + rows_.down * from_.height};
+    }
+    /// Nothing, for places behind the camera. The result may be outside the picture.
+    [[nodiscard]] std::optional<image_position> in_image(const view& what) const noexcept {
+        if (!(what.depth > 0)) {
             return std::nullopt;
         }
-        const double scale = from_.focal_length / depth;
-        return image_position{.x = from_.centre_x + scale * (columns_.east * east + columns_.north * north),
-                              .y = from_.centre_y +
-                                   scale * (rows_.east * east + rows_.north * north + rows_.down * from_.height)};
+        const double scale = from_.focal_length / what.depth;
+        return image_position{.x = from_.centre_x + scale * what.right, .y = from_.centre_y + scale * what.down};
+    }
+    [[nodiscard]] std::optional<image_position> to_image(plane_position at) const noexcept {
+        return in_image(seen(at));
     }
     /// From the camera to the ground along its optical axis, in metres.
     [[nodiscard]] double slant_range() const noexcept { return from_.height / axis_.down; }
