@@ -169,7 +169,7 @@ class Check(unittest.TestCase):
                                         ("sgd", "separation", "far", "expected"),
                                         ("strike", "weapons", "1001", "1000 at most"),
                                         ("strike", "speed", "0", "more than 0"),
-                                        ("strike", "scans", "101", "100 at most"),
+                                        ("strike", "scans", "31", "30 at most"),
                                         ("system", "interval_ms", "9", "interval_ms")):
             with self.subTest(f"{name} {key}: {value}"):
                 self.refused(f"node: a\nplugins:\n  - path: {PLUGINS}/libcles-{name}.so\n    config:\n"
