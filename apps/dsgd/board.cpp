@@ -2,21 +2,68 @@
 #include "board.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace dsgd {
 
 using cles::errc;
 
 board::board(const std::vector<sgd::order>& orders, const std::vector<std::string>& targets)
-    : parts_(orders.size()), nodes_(targets.begin(), targets.end()) {
+    : slots_(orders.size()), targets_(targets), parts_(orders.size()), nodes_(targets.begin(), targets.end()) {
     for (std::size_t i = 0; i < orders.size(); ++i) {
-        shards_.push_back({.what = orders[i], .target = targets.empty() ? "any" : targets[i % targets.size()]});
+        points_ += orders[i].count;
+        shards_.push_back({.what = orders[i], .target = target_of(i), .slot = i});
     }
+}
+
+board::board(std::uint64_t points, std::size_t slots, const sgd::order& like, const std::vector<std::string>& targets)
+    : slots_(slots), points_(points), targets_(targets), like_(like), splitter_(std::in_place, points, slots),
+      nodes_(targets.begin(), targets.end()) {}
+
+std::optional<std::size_t> board::next(std::size_t slot) {
+    if (!splitter_) {
+        return begun_.insert(slot).second ? std::optional{slot} : std::nullopt;
+    }
+    const auto shard = failure_ ? sgd::shard{} : splitter_->next(slot);
+    if (shard.count == 0) {
+        return {};
+    }
+    auto what = like_;
+    what.first = shard.first;
+    what.count = shard.count;
+    what.seed = like_.seed.value_or(1) + shards_.size();
+    shards_.push_back({.what = what, .target = target_of(slot), .slot = slot});
+    parts_.emplace_back();
+    return shards_.size() - 1;
+}
+
+std::string board::target_of(std::size_t slot) const {
+    if (targets_.empty()) {
+        return "any";
+    }
+    const auto& wanted = targets_[slot % targets_.size()];
+    return nodes_.contains(wanted) ? wanted : least_loaded();
+}
+
+times board::spent(double trial_ms) const {
+    times out;
+    std::vector<double> own(slots_);
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+        own[shards_[i].slot] += parts_[i].ms;
+        out.elapsed_ms = std::max(out.elapsed_ms, parts_[i].after_ms.value_or(parts_[i].ms));
+    }
+    out.elapsed_ms += trial_ms;
+    out.longest_ms = *std::max_element(own.begin(), own.end());
+    out.overhead_ms = out.elapsed_ms - out.longest_ms;
+    return out;
 }
 
 void board::done(std::size_t shard, const sgd::trained& part) {
     shards_[shard].fate = "done";
     parts_[shard] = part;
+    if (splitter_) {
+        splitter_->done(shards_[shard].slot, part.after_ms.value_or(part.ms));
+    }
 }
 
 bool board::failed(std::size_t shard, const cles::error& why) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "local.hpp"
 #include "pool.hpp"
 #include "sgd/parallel.hpp"
+#include "trial.hpp"
 
 #include <CLI/CLI.hpp>
 
@@ -13,19 +15,20 @@ struct arguments {
     std::vector<std::string> seeds{"tcp://127.0.0.1:25370"}, nodes{};
     std::uint64_t epochs = 100, seed = 1, deadline_s = 60;
     double rate = 1e-4;
-    bool weighted = false, json = false;
+    bool weighted = false, resplit = false, json = false;
 };
 
 struct report {
     std::string error{};
-    double trial_ms = 0;
-    sgd::times times{};
+    double trial_ms = 0;          ///< contained in the elapsed time
+    double trial_shortest_ms = 0; ///< the least time of a shard by which speeds were measured
+    dsgd::times times{};
     sgd::classifier result{};
     sgd::quality quality{};
     std::vector<dsgd::entry> shards{};
     std::vector<sgd::trained> parts{};
 };
-BOOST_DESCRIBE_STRUCT(report, (), (error, trial_ms, times, result, quality, shards, parts))
+BOOST_DESCRIBE_STRUCT(report, (), (error, trial_ms, trial_shortest_ms, times, result, quality, shards, parts))
 
 int report_failure(const cles::error& why) {
     const auto code = why.code();
@@ -34,12 +37,17 @@ int report_failure(const cles::error& why) {
     return missing ? 3 : code == cles::errc::deadline ? 4 : code == cles::errc::busy ? 6 : 5;
 }
 
-int report_result(const arguments& args, const sgd::data_set& data, const dsgd::board& all, double trial_ms = 0) {
-    report out{.trial_ms = trial_ms, .shards = all.shards(), .parts = all.parts()};
+int report_result(const arguments& args, const sgd::data_set& data, const dsgd::board& all,
+                  const dsgd::trial* before = nullptr) {
+    report out{.shards = all.shards(), .parts = all.parts()};
+    if (before != nullptr) {
+        out.trial_ms = before->spent_ms();
+        out.trial_shortest_ms = before->shortest_ms();
+    }
     if (all.failure()) {
         out.error = all.failure()->message();
     } else {
-        out.times = times_of(out.parts);
+        out.times = all.spent(out.trial_ms);
         out.result = average(out.parts);
         out.quality = judge(data, out.result);
     }
@@ -54,9 +62,12 @@ int report_result(const arguments& args, const sgd::data_set& data, const dsgd::
     if (all.failure()) {
         return report_failure(*all.failure());
     }
-    std::printf("elapsed   %.3f ms: the longest shard %.3f, overhead %.3f\n"
-                "mse       %.7f; best possible %.7f; %.4f %% of the points in the wrong class\n",
-                out.times.elapsed_ms, out.times.longest_ms, out.times.overhead_ms, out.quality.mse,
+    std::printf("elapsed   %.3f ms: the longest %s %.3f, overhead %.3f\n", out.times.elapsed_ms,
+                args.resplit ? "slot" : "shard", out.times.longest_ms, out.times.overhead_ms);
+    if (before != nullptr) {
+        std::printf("trial     %.3f ms, contained in the overhead\n", out.trial_ms);
+    }
+    std::printf("mse       %.7f; best possible %.7f; %.4f %% of the points in the wrong class\n", out.quality.mse,
                 out.quality.least_mse, out.quality.wrong * 100);
     return 0;
 }
@@ -65,7 +76,7 @@ int run_local(const arguments& args, const sgd::order& setup) {
     const sgd::data_set data{*setup.data};
     const auto orders = orders_for(sgd::divide(data.size(), std::vector<double>(args.threads, 1)), setup);
     dsgd::board all{orders, {"here"}};
-    for (std::size_t i = 0; const auto& part : train_here(data, orders)) {
+    for (std::size_t i = 0; const auto& part : dsgd::train_here(data, orders)) {
         all.done(i++, part);
     }
     return report_result(args, data, all);
@@ -76,7 +87,7 @@ int run(const arguments& args, sgd::order setup) {
     auto targets = args.nodes;
     const auto offered = pool.find();
     for (const auto& [node, data] : offered) {
-        if (args.nodes.empty() && args.weighted) {
+        if (args.nodes.empty() && (args.weighted || args.resplit)) {
             targets.push_back(node);
         }
         setup.data = data; // a node with other data refuses
@@ -87,23 +98,28 @@ int run(const arguments& args, sgd::order setup) {
         }
     }
     const sgd::data_set data{*setup.data};
-    std::vector<double> weights(args.shards, 1);
-    double trial_ms = 0;
-    if (args.weighted) {
-        auto trial_order = setup;
-        trial_order.epochs = std::max<std::uint64_t>(1, args.epochs / 10);
-        dsgd::board trial{orders_for(sgd::divide(data.size(), weights), trial_order), targets};
-        pool.train(trial);
-        if (trial.failure()) {
-            return report_result(args, data, trial);
-        }
-        targets = nodes_of(trial.parts()); // where each was done, in case a node was lost
-        trial_ms = times_of(trial.parts()).elapsed_ms;
-        weights = speeds(trial.parts());
+    if (args.resplit) {
+        dsgd::board all{data.size(), args.shards, setup, targets};
+        pool.train(all);
+        return report_result(args, data, all);
     }
-    dsgd::board all{orders_for(sgd::divide(data.size(), weights), setup), targets};
+    if (args.weighted) {
+        dsgd::trial before{data.size(), args.shards, setup, targets};
+        while (!before.finished()) {
+            auto attempt = before.attempt();
+            pool.train(attempt);
+            if (attempt.failure()) {
+                return report_result(args, data, attempt);
+            }
+            before.take(attempt);
+        }
+        dsgd::board all{orders_for(sgd::divide(data.size(), before.weights()), setup), before.targets()};
+        pool.train(all);
+        return report_result(args, data, all, &before);
+    }
+    dsgd::board all{orders_for(sgd::divide(data.size(), std::vector<double>(args.shards, 1)), setup), targets};
     pool.train(all);
-    return report_result(args, data, all, trial_ms);
+    return report_result(args, data, all);
 }
 
 } // namespace
@@ -112,10 +128,14 @@ int main(int argc, char** argv) {
     arguments args;
     CLI::App app{"Distributed stochastic gradient descent: delegates shards of a data set, and averages.", "cles-dsgd"};
     app.footer("Exit codes: 0 ok, 2 usage, 3 no node or no task, 4 deadline, 5 another error, 6 busy.");
-    app.add_option("-k,--shards", args.shards, "Number of shards of the data (4)")->check(CLI::Range(1, 1024));
+    app.add_option("-k,--shards", args.shards, "Number of shards, or with -r of those at one time (4)")
+        ->check(CLI::Range(1, 1024));
     app.add_option("--at", args.seeds, "A node that knows the others (tcp://127.0.0.1:25370)")->type_name("URL");
     app.add_option("-n,--nodes", args.nodes, "The nodes that train, in turn (default any)")->delimiter(',');
-    app.add_flag("-w,--weighted", args.weighted, "Measure the nodes first; faster ones get larger shards");
+    auto* weighted =
+        app.add_flag("-w,--weighted", args.weighted, "Measure the nodes first; faster ones get larger shards");
+    app.add_flag("-r,--resplit", args.resplit, "Divide what is left while the nodes work, by how fast they are")
+        ->excludes(weighted);
     app.add_option("--local", args.threads, "Train here, in this number of threads")->check(CLI::Range(1, 1024));
     app.add_option("-e,--epochs", args.epochs, "Steps for each point (100)")->check(CLI::Range(1, 1'000'000));
     app.add_option("--rate", args.rate, "Size of a step (0.0001)")->check(CLI::PositiveNumber);

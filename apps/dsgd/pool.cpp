@@ -21,17 +21,25 @@ BOOST_DESCRIBE_STRUCT(offers, (), (results))
 
 struct pool::round {
     board& all;
-    std::size_t open;
-    std::vector<double> progress;  ///< of each shard
-    double done = 0, reported = 0; ///< of all, in percent
+    std::size_t open;             ///< slots that may have more to do
+    std::vector<double> progress; ///< of the shard of each slot, in points
+    double done = 0;              ///< of all, in points
+    double reported = 0;          ///< in percent
     char end_of_line = ::isatty(STDERR_FILENO) == 1 ? '\r' : '\n';
     steady::time_point begun = steady::now();
 
-    void report_progress(double& shard, double part) {
-        done += (part - std::exchange(shard, part)) / static_cast<double>(progress.size()) * 100;
-        if (done >= reported + 10) {
-            reported = done;
-            std::fprintf(stderr, "cles-dsgd: %2.0f %% of %zu shards%c", done, progress.size(), end_of_line);
+    explicit round(board& what) : all(what), open(what.slots()), progress(what.slots()) {}
+
+    double ms() const { return std::chrono::duration<double, std::milli>(steady::now() - begun).count(); }
+
+    void report_progress(std::size_t shard, double part) {
+        const auto& entry = all.shards()[shard];
+        const auto points = part * static_cast<double>(entry.what.count);
+        done += points - std::exchange(progress[entry.slot], points);
+        if (const auto percent = done / static_cast<double>(all.points()) * 100; percent >= reported + 10) {
+            reported = percent;
+            std::fprintf(stderr, "cles-dsgd: %2.0f %% of %ju points%c", percent, std::uintmax_t{all.points()},
+                         end_of_line);
         }
     }
 };
@@ -55,41 +63,51 @@ std::map<std::string, sgd::recipe> pool::find() {
 }
 
 void pool::train(board& all) {
-    round now{all, all.shards().size(), std::vector<double>(all.shards().size())};
-    for (std::size_t i = 0; i < all.shards().size(); ++i) {
-        boost::asio::co_spawn(io_, delegate(now, i), boost::asio::detached);
+    round now{all};
+    for (std::size_t slot = 0; slot < all.slots(); ++slot) {
+        boost::asio::co_spawn(io_, work(now, slot), boost::asio::detached);
     }
     io_.restart();
     while (now.open != 0 && io_.run_one() != 0) {
     }
 }
 
+boost::asio::awaitable<void> pool::work(round& now, std::size_t slot) {
+    while (const auto shard = now.all.next(slot)) {
+        now.progress[slot] = 0; // what it has done before counts in `done`
+        co_await delegate(now, *shard);
+    }
+    --now.open;
+}
+
 boost::asio::awaitable<void> pool::delegate(round& now, std::size_t i) {
     auto options = cles::call_options{}.deadline(deadline_);
     if (progress_) {
-        options.on_progress([&now, i](double part, std::string_view) { now.report_progress(now.progress[i], part); });
+        options.on_progress([&now, i](double part, std::string_view) { now.report_progress(i, part); });
     }
-    const auto& shard = now.all.shards()[i];
-    while (shard.fate == "open") {
+    const auto what = now.all.shards()[i].what; // the vector may grow while this waits
+    while (now.all.shards()[i].fate == "open") {
         std::optional<cles::error> failure;
-        const auto noun = shard.target + ":sgd/train";
+        const auto noun = now.all.shards()[i].target + ":sgd/train";
         try {
-            auto part = co_await node_.async_delegate<sgd::trained>(noun, shard.what, options);
-            part.after_ms = std::chrono::duration<double, std::milli>(steady::now() - now.begun).count();
+            auto part = co_await node_.async_delegate<sgd::trained>(noun, what, options);
+            part.after_ms = now.ms();
             now.all.done(i, part);
         } catch (const cles::error& e) {
             failure = e;
         }
         if (failure && now.all.failed(i, *failure)) {
+            const auto& shard = now.all.shards()[i];
             std::fprintf(stderr, "cles-dsgd: shard %zu: %s; retrying at %s\n", i + 1, shard.trouble.back().c_str(),
                          shard.target.c_str());
             boost::asio::steady_timer pause{io_, std::chrono::milliseconds{20}};
             co_await pause.async_wait(boost::asio::use_awaitable);
         } else if (failure) {
             node_.stop(); // cancels the others
+        } else if (progress_) {
+            now.report_progress(i, 1);
         }
     }
-    --now.open;
 }
 
 } // namespace dsgd

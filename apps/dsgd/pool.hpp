@@ -19,11 +19,12 @@ class pool {
 
     /// The nodes that offer the task, with the recipe of their data. \throws cles::error that says what is missing
     std::map<std::string, sgd::recipe> find();
-    /// Delegates all shards at once, and returns when all have ended.
+    /// Delegates the shards of all slots at once, those of a slot one after the other. Returns when all have ended.
     void train(board& all);
 
   private:
     struct round;
+    boost::asio::awaitable<void> work(round& now, std::size_t slot);
     boost::asio::awaitable<void> delegate(round& now, std::size_t i);
 
     std::chrono::seconds deadline_;

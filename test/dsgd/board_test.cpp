@@ -13,6 +13,8 @@ using cles::errc;
 cles::error error(errc code) { return {code, "words"}; }
 const cles::error refused{boost::system::errc::make_error_code(boost::system::errc::connection_refused), "no link"};
 
+sgd::trained part_of(double ms, double after_ms) { return {.ms = ms, .after_ms = after_ms}; }
+
 dsgd::board four(const std::vector<std::string>& targets) { return dsgd::board{std::vector<sgd::order>(4), targets}; }
 
 } // namespace
@@ -103,6 +105,64 @@ BOOST_AUTO_TEST_CASE(the_first_failure_ends_all) {
     BOOST_TEST(all.shards()[2].fate == "withdrawn");
     BOOST_TEST(all.shards()[3].fate == "done");
     BOOST_TEST(all.failure()->message().starts_with("shard 1: "));
+}
+
+BOOST_AUTO_TEST_CASE(a_slot_has_one_shard) {
+    auto all = four({"a"});
+    BOOST_TEST(all.slots() == 4U);
+    BOOST_TEST(*all.next(2) == 2U);
+    BOOST_TEST(!all.next(2));
+    BOOST_TEST(*all.next(0) == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(overhead_is_what_the_longest_shard_does_not_take) {
+    auto all = four({"a"});
+    all.done(0, part_of(5, 6));
+    all.done(1, part_of(4, 9));
+    all.done(2, part_of(7, 8));
+    all.done(3, part_of(1, 2));
+    BOOST_TEST(all.spent().elapsed_ms == 9);
+    BOOST_TEST(all.spent().longest_ms == 7);
+    BOOST_TEST(all.spent().overhead_ms == 2);
+    BOOST_TEST(all.spent(100).elapsed_ms == 109);
+    BOOST_TEST(all.spent(100).overhead_ms == 102);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_left_is_split_again) {
+    dsgd::board all{16'000, 2, {.epochs = 3, .seed = 5}, {"a", "b"}};
+    BOOST_TEST(all.points() == 16'000U);
+    BOOST_TEST(*all.next(0) == 0U);
+    BOOST_TEST(*all.next(1) == 1U);
+    all.done(1, part_of(80, 100));
+    BOOST_TEST(*all.next(1) == 2U);
+    const auto& third = all.shards()[2];
+    BOOST_TEST(third.target == "b");
+    BOOST_TEST(third.slot == 1U);
+    BOOST_TEST(third.what.first == 2'000U);
+    BOOST_TEST(third.what.count == 3'500U);
+    BOOST_TEST(*third.what.seed == 7U);
+    BOOST_TEST(*third.what.epochs == 3U);
+    all.done(2, part_of(30, 150));
+    BOOST_TEST(all.spent().longest_ms == 110); // of both shards of the slot
+}
+
+BOOST_AUTO_TEST_CASE(a_lost_node_gets_no_more_shards) {
+    dsgd::board all{16'000, 2, {}, {"a", "b"}};
+    all.next(0);
+    all.next(1);
+    BOOST_TEST(all.failed(1, error(errc::unavailable)));
+    BOOST_TEST(all.shards()[1].target == "a");
+    all.done(1, part_of(80, 100));
+    BOOST_TEST(all.shards()[*all.next(1)].target == "a");
+}
+
+BOOST_AUTO_TEST_CASE(after_a_failure_no_shards_are_made) {
+    dsgd::board all{16'000, 2, {}, {"a"}};
+    all.next(0);
+    all.next(1);
+    BOOST_TEST(!all.failed(0, error(errc::failed)));
+    all.done(1, part_of(80, 100));
+    BOOST_TEST(!all.next(1));
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -6,9 +6,7 @@
 namespace parallel {
 namespace {
 
-sgd::trained part_of(const char* node, std::uint64_t points, double after_ms, const sgd::classifier& c = {}) {
-    return {.node = node, .result = c, .points = points, .steps = points, .ms = after_ms, .after_ms = after_ms};
-}
+sgd::trained part_of(std::uint64_t points, const sgd::classifier& c) { return {.result = c, .points = points}; }
 
 } // namespace
 } // namespace parallel
@@ -50,56 +48,13 @@ BOOST_AUTO_TEST_CASE(each_order_draws_for_itself) {
 }
 
 BOOST_AUTO_TEST_CASE(equal_shards_count_alike) {
-    const auto mean = sgd::average({part_of("a", 5, 1, {{1, 2}, 3}), part_of("b", 5, 1, {{3, 6}, 9})});
+    const auto mean = sgd::average({part_of(5, {{1, 2}, 3}), part_of(5, {{3, 6}, 9})});
     BOOST_TEST((mean == sgd::classifier{{2, 4}, 6}));
 }
 
 BOOST_AUTO_TEST_CASE(a_larger_shard_counts_for_more) {
-    const auto mean = sgd::average({part_of("a", 3, 1, {{1, 0}, 4}), part_of("b", 1, 1, {{5, 8}, 0})});
+    const auto mean = sgd::average({part_of(3, {{1, 0}, 4}), part_of(1, {{5, 8}, 0})});
     BOOST_TEST((mean == sgd::classifier{{2, 2}, 3}));
-}
-
-BOOST_AUTO_TEST_CASE(a_node_that_is_twice_as_fast_has_shards_twice_as_large) {
-    const auto of = sgd::speeds({part_of("fast", 100, 10), part_of("slow", 100, 20)});
-    BOOST_TEST((sgd::divide(300, of) == std::vector<sgd::shard>{{0, 200}, {200, 100}}));
-}
-
-// Two workers, four shards: the last two waited for the first two.
-BOOST_AUTO_TEST_CASE(what_waits_for_a_worker_counts) {
-    const auto of = sgd::speeds({part_of("small", 100, 10), part_of("small", 100, 10), part_of("small", 100, 20),
-                                 part_of("small", 100, 20), part_of("large", 100, 10)});
-    BOOST_TEST(of[0] == of[3]);
-    BOOST_TEST(of[0] == 5.0);
-    BOOST_TEST(of[4] == 10.0);
-}
-
-BOOST_AUTO_TEST_CASE(threads_give_what_one_after_the_other_gives) {
-    const sgd::data_set data{sgd::recipe{.per_class = 1'000}};
-    const auto orders = sgd::orders_for(sgd::divide(data.size(), {1, 2, 1}), {.epochs = 20, .rate = 1e-3, .seed = 4});
-    const auto parts = train_here(data, orders);
-    BOOST_TEST(parts.size() == 3U);
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-        sgd::training alone{
-            data, {orders[i].first, orders[i].count}, {.steps = 20 * orders[i].count, .rate = 1e-3, .seed = 4 + i}};
-        while (alone.step()) {
-        }
-        BOOST_TEST((parts[i].result == alone.result()));
-        BOOST_TEST(parts[i].points == orders[i].count);
-        BOOST_TEST(parts[i].ms > 0);
-        BOOST_TEST(*parts[i].after_ms >= parts[i].ms);
-    }
-}
-
-// The shards' errors differ, so their mean is closer to the best line than each of them.
-BOOST_AUTO_TEST_CASE(the_mean_is_better_than_its_parts) {
-    const sgd::data_set data{sgd::recipe{.per_class = 10'000}};
-    const auto parts = train_here(
-        data, sgd::orders_for(sgd::divide(data.size(), {1, 1, 1, 1}), {.epochs = 200, .rate = 1e-3, .seed = 1}));
-    double mean = 0;
-    for (const auto& part : parts) {
-        mean += mean_squared_error(data, part.result) / 4;
-    }
-    BOOST_TEST(mean_squared_error(data, average(parts)) < mean);
 }
 
 BOOST_AUTO_TEST_SUITE_END()
