@@ -39,11 +39,12 @@ class Hosts:
         self.near = Host(near, cores, keepers[0] if keepers else None)
         self.far = Host(far, cores[-1:], keepers[1] if keepers else None, self.group)
         self.others = cores[:-1] or cores  # all but the core of the second host
-        self.quota = quota if self.group else None
+        self.quota, self.period_ms = (quota, self.PERIOD_US / 1000) if self.group else (None, None)
 
     def described(self):
         return {"namespaces": bool(self.keepers), "cores": self.near.cores, "far_cores": self.far.cores,
-                "far_quota": self.quota, "near_cores_beside_far": self.others, "not_allowed": self.missing}
+                "far_quota": self.quota, "far_period_ms": self.period_ms, "near_cores_beside_far": self.others,
+                "not_allowed": self.missing}
 
     def _make_namespaces(self):
         try:

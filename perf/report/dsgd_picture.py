@@ -1,14 +1,24 @@
 # SPDX-License-Identifier: BSL-1.0
-"""The pictures of distributed stochastic gradient descent: Table 2, how long each row took, with the paper's; the data
-set with its classifier, and a detail of it at the boundary between the classes (Figs. 5 and 6)."""
+"""The pictures of distributed stochastic gradient descent: Table 2 as speed-ups, what DELEGATE costs and what a second host
+gains as ratios, both by the size of the shards; the data set with its classifier, and a detail of it at the boundary
+between the classes (Figs. 5 and 6)."""
 
-from .gnuplot import block, draw
+import statistics
+
+from .gnuplot import Missing, block, draw, line_style, quoted
 
 
 def kinds(raw, note):
-    shown = [("dsgd", "Distributed stochastic gradient descent, elapsed time of each row of Table 2: medians with their 95 % "
-             "intervals, and what the paper's machines took for another amount of work: the paper does not say how many steps. "
-             "Compare the rows of one colour with each other, not the two colours.", lambda: elapsed(raw, note))]
+    shown = [
+        ("dsgd", "Table 2 as speed-ups over one thread on the first host, drawn as a share of the most that the cores of the row "
+         "could reach by the speed of one thread. The paper's machines ran 4 threads each.", lambda: speed_ups(raw, note)),
+        ("dsgd_cost", "What DELEGATE costs: elapsed time to that of threads on the same cores without CLES; for both hosts, to "
+         "threads on both without any loss. 1 is the least. The trial before shards by speed is a part of its bar.",
+         lambda: costs(raw, note))]
+    if raw.get("sizes"):
+        shown.append(("dsgd_sizes", "By the size of the shards, which is the time of one without CLES. Left: what DELEGATE adds "
+                      "on the same host (values of zero or less are not drawn). Right: how many times faster both hosts are than "
+                      "the first alone. Medians, with their 95 % intervals.", lambda: sizes(raw, note)))
     if "pictured" in raw:
         data = raw["pictured"]
         shown += [
@@ -38,28 +48,106 @@ plot $class0 using 1:2 with points pointtype 7 pointsize {0.35 if half_a_side el
 """, 620, 480, note)
 
 
-def elapsed(raw, note):
-    rows = raw["rows"]
-    ours, paper, ticks, most = [], [], [], 0.0
-    for place, row in enumerate(reversed(rows)):
-        took = row["elapsed_ms"]
-        most = max(most, took["high"], row["paper_ms"] or 0)
-        ours.append((place + 0.19, took["median"], took["low"], took["high"], f"{took['median']:,.0f} ms".replace(",", " ")))
-        if row["paper_ms"]:
-            paper.append((place - 0.19, row["paper_ms"], f"{row['paper_ms']:,} ms".replace(",", " ")))
-        ticks.append(f"'{row['meaning']}' {place}")
-    epochs = raw.get("epochs")
-    return draw("dsgd", block("ours", ours) + block("paper", paper) + f"""set yrange [-0.6:{len(rows) - 0.4}]
-set xrange [0:{most * 1.18}]
-set ytics ({', '.join(ticks)})
+def speed_ups(raw, note):
+    def part(value, most):
+        return f"{value:.3g} of {most:.3g}"
+
+    found = []
+    for meaning, each, _ in _ratios(raw, "speed_up_"):
+        if "most" in each:
+            scaled = tuple(each[end] / each["most"] for end in ("value", "low", "high"))
+            paper = each["paper"] and (each["paper"] / each["paper_most"], part(each["paper"], each["paper_most"]))
+            found.append((meaning, scaled, part(each["value"], each["most"]), paper, 0))
+    return bars("dsgd", found, "speed-up, as a share of the most", note)
+
+
+def costs(raw, note):
+    found = []
+    for meaning, each, row in _ratios(raw, "cost_"):
+        trial = statistics.median(row["trial_all_ms"]) / row["elapsed_ms"]["median"] if "trial_all_ms" in row else 0
+        paper = each["paper"] and (each["paper"], f"{each['paper']:.4g}")
+        found.append((meaning, tuple(each[end] for end in ("value", "low", "high")), f"{each['value']:.4g}", paper, trial))
+    return bars("dsgd_cost", found, "times as long as threads", note)
+
+
+def _ratios(raw, prefix):
+    figures = {each["name"]: each for each in raw["figures"]}
+    return [(row["meaning"], figures[prefix + row["name"]], row) for row in raw["rows"] if prefix + row["name"] in figures]
+
+
+def bars(name, rows, label, note):
+    """Rows: what it is; value, low, high; its text; the paper's value and text, or None; the share of the trial."""
+    if not rows:
+        raise Missing("there are no ratios")
+    ours, paper, trial, ticks = [], [], [], []
+    for place, (meaning, (value, low, high), text, papers, share) in enumerate(reversed(rows)):
+        ours.append((place + 0.19, value, low, high, text))
+        if papers:
+            paper.append((place - 0.19, *papers))
+        if share:
+            trial.append((place + 0.19, value * (1 - share), value))
+        ticks.append(f"{quoted(meaning)} {place}")
+    most = max([each[3] for each in ours] + [each[1] for each in paper])
+    small = "font 'sans-serif,11'"
+    parts = ["$ours using (0):1:(0):2:($1-0.17):($1+0.17) with boxxyerror linecolor '#0072b2' title 'here'"]
+    if trial:
+        parts.append("$trial using 2:1:2:3:($1-0.17):($1+0.17) with boxxyerror linecolor '#56b4e9' title 'of it the trial'")
+    if paper:
+        parts += ["$paper using (0):1:(0):2:($1-0.17):($1+0.17) with boxxyerror linecolor '#bbbbbb' title 'the paper'",
+                  f"$paper using 2:1:3 with labels left offset 0.7,0 {small} textcolor '#555555' notitle"]
+    parts += ["$ours using 2:1:3:4 with xerrorbars linecolor '#222222' pointtype 0 linewidth 1.5 notitle",
+              f"$ours using 4:1:5 with labels left offset 0.7,0 {small} notitle"]
+    data = [block(key, found) for key, found in (("ours", ours), ("paper", paper), ("trial", trial)) if found]
+    return draw(name, "".join(data) + f"""set yrange [-0.6:{len(rows) - 0.4}]
+set xrange [0:{most * 1.25}]
+set ytics ({', '.join(ticks)}) {small}
 set grid noytics
-set xlabel 'elapsed, ms{f" ({epochs} epochs here)" if epochs else ""}'
+set xlabel '{label}'
 set key outside top right horizontal
-set boxwidth 0.36
-bar(y) = 0.17
-plot $ours using (0):1:(0):2:($1-bar(0)):($1+bar(0)) with boxxyerror linecolor '#0072b2' title 'here', \\
-     $paper using (0):1:(0):2:($1-bar(0)):($1+bar(0)) with boxxyerror linecolor '#bbbbbb' title 'the paper, another amount of work', \\
-     $ours using 2:1:3:4 with xerrorbars linecolor '#222222' pointtype 0 linewidth 1.5 notitle, \\
-     $ours using 4:1:5 with labels left offset 0.7,0 font 'sans-serif,11' notitle, \\
-     $paper using 2:1:3 with labels left offset 0.7,0 font 'sans-serif,11' textcolor '#555555' notitle
+set arrow from 1,-0.6 to 1,{len(rows) - 0.4} nohead linecolor '#888888' dashtype (4,3)
+plot {', '.join(parts)}
+""", 860, 120 + 40 * len(rows), note)
+
+
+def sizes(raw, note):
+    def column(key):
+        return [(each["shard_ms"]["median"], *(each[key][end] for end in ("median", "low", "high"))) for each in raw["sizes"]]
+
+    def positive(key):
+        return [(x, *(value if value > 0 else None for value in values)) for x, *values in column(key)]
+
+    lines = {"paper": positive("share"), "strict": positive("strict_share"), "even": column("gain_even"),
+             "resplit": column("gain_resplit")}
+    ends = [row[0] for row in lines["even"]]
+    titles = {"paper": "DELEGATE less local threads (the paper''s)", "strict": "elapsed less the longest shard''s own time",
+              "even": "even shards", "resplit": "re-split"}
+
+    def plot(*names):
+        return ", ".join(f"${name} using 1:2:3:4 with yerrorlines {line_style(list(lines).index(name))} title '{titles[name]}'"
+                         for name in names)
+
+    most = next((each["value"] for each in raw["figures"] if each["name"] == "gain_most"), 1)
+    return draw("dsgd_sizes", "".join(block(name, rows) for name, rows in lines.items()) + f"""set logscale x
+set xrange [{min(ends) / 1.5}:{max(ends) * 1.5}]
+set xlabel 'time of a shard, ms'
+set tmargin at screen 0.7
+set bmargin at screen 0.2
+set multiplot
+set lmargin at screen 0.08
+set rmargin at screen 0.46
+set key at screen 0.08,0.97 left top Left reverse samplen 3
+set title 'overhead, % of the time without CLES' offset 0,-0.5
+set logscale y
+set format y '%g'
+plot {plot("paper", "strict")}
+unset label
+unset logscale y
+set yrange [0:*]
+set lmargin at screen 0.56
+set rmargin at screen 0.97
+set key at screen 0.56,0.97 left top Left reverse samplen 3
+set title 'both hosts: times faster than the first alone' offset 0,-0.5
+plot {plot("even", "resplit")}, {most!r} with lines linecolor '#999999' dashtype (2,4) linewidth 1.5 title 'the most', \\
+     1 with lines linecolor '#cccccc' notitle
+unset multiplot
 """, 860, 460, note)

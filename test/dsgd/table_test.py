@@ -15,12 +15,14 @@ import unittest
 from pathlib import Path
 
 FOLDER, PROGRAMS = sys.argv[1], sys.argv[2]
-sys.path.insert(0, FOLDER)
+sys.path[:0] = [FOLDER, str(Path(__file__).parents[1] / "perf")]
+import dsgd_figures  # noqa: E402
 import dsgd_points  # noqa: E402
 import interval  # noqa: E402
+import reported  # noqa: E402
 
-ROWS = ["local_one_near", "local_one_far", "local_all_near", "local_all_far", "near_asked_by_near", "near_asked_by_far",
-        "both_asked_by_far", "both_weighted"]
+ROWS = ["local_one_near", "local_one_far", "local_all_near", "local_all_far", "local_all_beside", "near_asked_by_near",
+        "near_asked_by_far", "beside_asked_by_far", "both_asked_by_far", "both_weighted", "both_resplit"]
 
 
 class Table(unittest.TestCase):
@@ -40,12 +42,63 @@ class Table(unittest.TestCase):
             self.assertEqual(row["elapsed_ms"]["runs"], 3)
             self.assertGreater(row["elapsed_ms"]["low"], 0)
             if not row["name"].startswith("local"):
-                self.assertGreater(row["overhead_ms"]["median"], 0)
-        weighted = result["rows"][-1]
-        for points in weighted["points"]:
-            self.assertEqual(sum(points), 200_000)
+                self.assertTrue(all(ms > 0 for ms in row["overhead_all_ms"]))
+        rows = {row["name"]: row for row in result["rows"]}
+        weighted = rows["both_weighted"]
+        for elapsed, trial, overhead in zip(weighted["elapsed_all_ms"], weighted["trial_all_ms"], weighted["overhead_all_ms"]):
+            self.assertGreater(trial, 0)
+            self.assertGreater(overhead, trial)  # which contains it
+            self.assertGreater(elapsed, overhead)
+        for row in (weighted, rows["both_resplit"]):
+            for points in row["points"]:
+                self.assertEqual(sum(count for _, count in points), 200_000)
+                self.assertLessEqual({node for node, _ in points}, {"beside", "far"})
+        self.assertEqual([each["epochs"] for each in result["sizes"]], [1, 3, 10])
+        for each in result["sizes"]:
+            self.assertGreater(each["shard_ms"]["median"], 0)
+            self.assertGreater(each["gain_resplit"]["median"], 0)
+        reported.check(self, "dsgd", result)
         if result["hosts"]["far_quota"] is None:
             self.assertTrue(any("quota" in text for text in result["hosts"]["not_allowed"]))
+
+    def test_figures_are_of_the_papers_quantities(self):
+        def row(name, elapsed, overhead=()):
+            return {"name": name, "meaning": name, "elapsed_all_ms": elapsed, "elapsed_ms": interval.summary(elapsed),
+                    "mse": [0.0189, 0.019], "least_mse": 0.0189, "overhead_all_ms": list(overhead)}
+
+        hosts = {"cores": [0, 1, 2, 3], "far_cores": [0, 1, 2, 3], "near_cores_beside_far": [0, 1, 2, 3], "far_period_ms": 10.0}
+        # The paper's own table: the differences and ratios have to be the paper's.
+        paper = dsgd_figures.PAPER_MS
+        rows = [row(name, [float(paper.get(name, 2000.0))] * 3, [4.0] * 3) for name in ROWS]
+        rows[ROWS.index("local_all_beside")] = row("local_all_beside", [float(paper["local_all_near"])] * 3)
+        rows[ROWS.index("beside_asked_by_far")] = row("beside_asked_by_far", [float(paper["near_asked_by_far"])] * 3, [4.0] * 3)
+        rows[ROWS.index("both_weighted")].update(trial_all_ms=[30.0] * 3, trial_shortest_all_ms=[9.0, 11.0, 12.0])
+        found = {each["name"]: each for each in dsgd_figures.figures(rows, [], hosts, 4)}
+        compared = [each for name, each in found.items() if each["paper"] is not None and name not in ("mse", "lines")]
+        self.assertGreater(len(compared), 12)
+        for each in compared:
+            self.assertAlmostEqual(each["value"], each["paper"], 9, each["name"])
+        for each in ("local_all_near", "local_all_far", "near_asked_by_far", "both_asked_by_far"):
+            self.assertAlmostEqual(found[f"speed_up_{each}"]["most"], found[f"speed_up_{each}"]["paper_most"], 9)
+        self.assertEqual(found["speed_up_local_all_near"]["most"], 4)
+        self.assertAlmostEqual(found["speed_up_both_asked_by_far"]["most"], 4 + 4 * 8150 / 9360, 9)
+        self.assertEqual(found["delegate_less_local"]["paper"], 10)
+        self.assertAlmostEqual(found["delegate_less_local_share"]["paper"], 0.4587, 4)
+        self.assertEqual(found["far_less_near"]["paper"], 100)
+        strict = found["overhead"]
+        self.assertEqual((strict["value"], strict["paper"], strict["reached"]), (4.0, None, False))
+        self.assertFalse(found["trial_shortest"]["reached"])  # one was shorter than the period
+        self.assertTrue(found["work"]["reached"])
+        self.assertIsNone(found["mse"]["target"])
+        self.assertLess(found["lines"]["value"], 300)
+
+    def test_ratios_are_of_one_round(self):
+        self.assertEqual(dsgd_figures.together([2.0, 2.0]), 1.0)
+        sizes = [{"share": {"median": share}, "gain_resplit": {"median": gain}, "shard_ms": {"median": ms}}
+                 for ms, share, gain in ((1, 90, 0.5), (10, 5, 0.9), (100, 0.5, 1.2), (1000, 0.1, 1.4))]
+        self.assertEqual([(each["name"], each["value"]) for each in dsgd_figures.of_sizes(sizes)],
+                         [("shard_cheap", 100), ("shard_worth", 100)])
+        self.assertEqual(list(dsgd_figures.of_sizes(sizes[:2])), [])
 
     def test_a_classifiers_error_is_found_again(self):
         points = dsgd_points.made()

@@ -196,8 +196,8 @@ class Pictures(unittest.TestCase):
                 missing[name] = words(figure)
             else:
                 drawn[name] = len(list(svg.iter("{http://www.w3.org/2000/svg}path")))
-        self.assertEqual(sorted(drawn), sorted(["latency", "parse", "fan_out", "bytes", "dsgd", "latency_own", "latency_values",
-                                                "latency_error_1", "latency_speeds"]))
+        self.assertEqual(sorted(drawn), sorted(["latency", "parse", "fan_out", "bytes", "dsgd", "dsgd_cost", "dsgd_sizes",
+                                                "latency_own", "latency_values", "latency_error_1", "latency_speeds"]))
         self.assertTrue(all(paths > 10 for name, paths in drawn.items() if name != "latency_own"), drawn)
         self.assertEqual(sorted(missing), ["latency_broken", "latency_odd"])
         self.assertEqual(sorted(path.name for path in (folder.path / "pictures").iterdir()), ["latency.svg"])
@@ -239,8 +239,10 @@ class Pictures(unittest.TestCase):
         shown = {each.get("id"): words(each) for each in root.iter("{http://www.w3.org/1999/xhtml}figure")}
         self.assertIn("CLES over a Unix socket", shown["picture-latency"])
         self.assertIn("1 MiB", shown["picture-parse"])
-        self.assertIn("8 150 ms", shown["picture-dsgd"])
-        self.assertIn("the paper, another amount of work", shown["picture-dsgd"])
+        self.assertIn("3.74 of 4", shown["picture-dsgd"])  # the paper's 8150 ms to its 2180
+        self.assertNotIn("150 ms", shown["picture-dsgd"])
+        self.assertIn("of it the trial", shown["picture-dsgd_cost"])
+        self.assertIn("time of a shard, ms", shown["picture-dsgd_sizes"])
         self.assertIn("by hand, multicast", shown["picture-fan_out"])
         self.assertIn("a quick run", shown["picture-bytes"])
 
