@@ -12,10 +12,12 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import unittest.mock
 from pathlib import Path
 
 FOLDER, PROGRAMS = sys.argv[1], sys.argv[2]
 sys.path[:0] = [FOLDER, str(Path(__file__).parents[1] / "perf")]
+import dsgd  # noqa: E402
 import dsgd_figures  # noqa: E402
 import dsgd_points  # noqa: E402
 import interval  # noqa: E402
@@ -92,7 +94,24 @@ class Table(unittest.TestCase):
         self.assertIsNone(found["mse"]["target"])
         self.assertLess(found["lines"]["value"], 300)
 
-    def test_ratios_are_of_one_round(self):
+    def test_the_work_takes_as_long_as_it_should(self):
+        asked = []
+
+        def run_manager(programs, host, arguments, epochs):
+            self.assertEqual((programs, host, arguments), ("apps", "host", ["--local", "4"]))
+            asked.append(epochs)
+            disturbed = 500 if len(asked) % 3 == 1 else 0  # in one of three runs
+            return {"times": {"elapsed_ms": 5 + 0.5 * epochs + disturbed}}
+
+        with unittest.mock.patch.object(dsgd, "run_manager", run_manager):
+            epochs = dsgd.epochs_for("apps", "host", 4, 2300)
+        self.assertAlmostEqual(5 + 0.5 * epochs, 2300, delta=25)
+        self.assertLess(len(asked), 12)
+        asked.clear()
+        with unittest.mock.patch.object(dsgd, "run_manager", run_manager):
+            self.assertLessEqual(dsgd.epochs_for("apps", "host", 4, 1), 20)  # which is not possible
+
+    def test_the_smallest_shards_that_are_worth_it_are_found(self):
         self.assertEqual(dsgd_figures.together([2.0, 2.0]), 1.0)
         sizes = [{"share": {"median": share}, "gain_resplit": {"median": gain}, "shard_ms": {"median": ms}}
                  for ms, share, gain in ((1, 90, 0.5), (10, 5, 0.9), (100, 0.5, 1.2), (1000, 0.1, 1.4))]
