@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <stdexcept>
 
 namespace sgd {
 namespace {
@@ -35,6 +36,9 @@ std::string to_string(const recipe& r) {
 }
 
 data_set::data_set(const recipe& from) : recipe_(from) {
+    if (from.per_class == 0 || from.per_class > most_per_class) {
+        throw std::invalid_argument(to_string(from) + ": 1 to " + std::to_string(most_per_class) + " are possible");
+    }
     random_source chance{from.seed};
     // The means lie on the diagonal, as far from the origin on either side.
     const auto mean = from.separation / 2 / std::numbers::sqrt2;

@@ -10,6 +10,8 @@
 
 namespace sgd {
 
+inline constexpr std::uint64_t most_per_class = 10'000'000;
+
 struct point {
     double x = 0, y = 0;
 };
@@ -17,7 +19,7 @@ struct point {
 /// What a data set is made from: the same recipe gives the same points everywhere, so that none has to travel.
 struct recipe {
     std::uint64_t seed = 1;
-    std::uint64_t per_class = 100'000; ///< points of each class
+    std::uint64_t per_class = 100'000; ///< points of each class, 1 to `most_per_class`
     double separation = 7;             ///< from the mean of one class to that of the other; each has the variance 1
 
     bool operator==(const recipe&) const = default;
@@ -31,6 +33,7 @@ std::string to_string(const recipe& r);
 /// classes take turns, so that any stretch of it holds as many of one as of the other.
 class data_set {
   public:
+    /// \throws std::invalid_argument if the number of points is out of range
     explicit data_set(const recipe& from);
 
     [[nodiscard]] const recipe& made_from() const noexcept { return recipe_; }

@@ -31,7 +31,7 @@ struct trained {
     std::uint64_t points = 0;
     std::uint64_t steps = 0;
     double ms = 0; ///< that the descent itself took, by the node's own clock
-    /// When it was there, by the clock of the requester, from the beginning of all. No node says so.
+    /// When it had arrived, by the requester's clock, since the beginning of all. The requester adds it.
     std::optional<double> after_ms{};
 };
 BOOST_DESCRIBE_STRUCT(trained, (), (node, result, points, steps, ms, after_ms))

@@ -4,10 +4,16 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
+#include <string>
 
 namespace sgd {
 
 std::vector<shard> divide(std::uint64_t points, const std::vector<double>& weights) {
+    if (weights.size() > points) {
+        throw std::invalid_argument(std::to_string(weights.size()) + " shards of " + std::to_string(points) +
+                                    " points: each takes at least one");
+    }
     const auto all = std::accumulate(weights.begin(), weights.end(), 0.0);
     std::vector<shard> out;
     std::uint64_t at = 0;

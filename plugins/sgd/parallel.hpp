@@ -13,8 +13,8 @@ namespace sgd {
 
 /// Divides the points into as many shards as there are weights, each as large as its weight says, and none empty: all
 /// points, each once.
-/// \param points  as many as there are weights, or more
 /// \param weights more than 0 each
+/// \throws std::invalid_argument if there are more weights than points
 std::vector<shard> divide(std::uint64_t points, const std::vector<double>& weights);
 
 /// An order for each shard, with draws of its own.

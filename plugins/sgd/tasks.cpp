@@ -18,7 +18,6 @@ using cles::errc;
 using cles::error;
 using steady = std::chrono::steady_clock;
 
-constexpr std::uint64_t most_per_class = 10'000'000;
 constexpr std::uint64_t most_epochs = 1'000'000;
 
 [[noreturn]] void refuse(const std::string& why) { throw error(errc::bad_request, why); }

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 BOOST_AUTO_TEST_SUITE(data_set)
 
@@ -54,6 +55,12 @@ BOOST_AUTO_TEST_CASE(each_class_is_normally_distributed_about_its_mean) {
         BOOST_TEST(std::abs(product / 50'000) < 0.023);
         BOOST_TEST(std::abs(within / 50'000 - 0.6827) < 0.011);
     }
+}
+
+BOOST_AUTO_TEST_CASE(a_recipe_for_too_many_points_is_refused) {
+    BOOST_CHECK_THROW(sgd::data_set{sgd::recipe{.per_class = 0}}, std::invalid_argument);
+    BOOST_CHECK_THROW(sgd::data_set{sgd::recipe{.per_class = sgd::most_per_class + 1}}, std::invalid_argument);
+    BOOST_CHECK_THROW(sgd::data_set{sgd::recipe{.per_class = std::uint64_t(-1)}}, std::invalid_argument);
 }
 
 BOOST_AUTO_TEST_CASE(a_recipe_is_told_to_people) {

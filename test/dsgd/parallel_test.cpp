@@ -3,6 +3,8 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <stdexcept>
+
 namespace parallel {
 namespace {
 
@@ -28,6 +30,11 @@ BOOST_AUTO_TEST_CASE(all_points_are_in_one_shard_each) {
             BOOST_TEST(next == points);
         }
     }
+}
+
+BOOST_AUTO_TEST_CASE(more_shards_than_points_are_refused) {
+    BOOST_TEST(sgd::divide(3, {1, 1, 1}).size() == 3U);
+    BOOST_CHECK_THROW(sgd::divide(2, {1, 1, 1}), std::invalid_argument);
 }
 
 BOOST_AUTO_TEST_CASE(a_shard_is_as_large_as_its_weight) {
