@@ -28,9 +28,9 @@ std::vector<double> speeds(const std::vector<sgd::trained>& parts) {
 }
 
 trial::trial(std::uint64_t points, std::size_t shards, const sgd::order& work, std::vector<std::string> targets)
-    : points_(points), most_epochs_(work.epochs.value_or(1)), what_(work), targets_(std::move(targets)),
-      weights_(shards, 1) {
-    what_.epochs = std::max<std::uint64_t>(1, most_epochs_ / first_part);
+    : points_(points), most_epochs_(std::max<std::uint64_t>(1, work.epochs.value_or(1) / most_divisor)), what_(work),
+      targets_(std::move(targets)), weights_(shards, 1) {
+    what_.epochs = std::max<std::uint64_t>(1, work.epochs.value_or(1) / first_divisor);
 }
 
 board trial::attempt() const {
@@ -40,17 +40,24 @@ board trial::attempt() const {
 
 void trial::take(const board& all) {
     const auto& parts = all.parts();
-    targets_.clear();
+    std::vector<std::string> nodes;
+    bool lost = false;
     shortest_ms_ = parts.front().ms;
     for (const auto& part : parts) {
-        targets_.push_back(part.node);
+        lost = lost || part.node != targets_[nodes.size() % targets_.size()];
+        nodes.push_back(part.node);
         shortest_ms_ = std::min(shortest_ms_, part.ms);
     }
+    targets_ = std::move(nodes);
     weights_ = speeds(parts);
     spent_ms_ += all.spent().elapsed_ms;
-    finished_ = shortest_ms_ >= least_ms || what_.epochs == most_epochs_;
+    ++attempts_;
+    if (lost) {
+        return;
+    }
+    finished_ = shortest_ms_ >= least_trial_ms || what_.epochs == most_epochs_;
     // A quarter more, because the next one may be faster. At least twice as much, so that it comes to an end.
-    const auto times_more = std::max(2.0, 1.25 * least_ms / std::max(shortest_ms_, 1e-3));
+    const auto times_more = std::max(2.0, 1.25 * least_trial_ms / std::max(shortest_ms_, 1e-3));
     const auto epochs = std::ceil(times_more * static_cast<double>(what_.epochs.value_or(1)));
     what_.epochs = epochs < static_cast<double>(most_epochs_) ? static_cast<std::uint64_t>(epochs) : most_epochs_;
 }

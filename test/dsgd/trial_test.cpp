@@ -47,31 +47,33 @@ BOOST_AUTO_TEST_CASE(what_waits_for_a_worker_counts) {
 BOOST_AUTO_TEST_CASE(a_part_of_the_work_is_enough_if_it_takes_long) {
     dsgd::trial t{points, 2, work, {"a", "b"}};
     BOOST_TEST(*t.attempt().shards()[0].what.epochs == 200U);
-    t.take(done(t, {0.5, 1.5}));
+    t.take(done(t, {1.5, 4.5}));
     BOOST_TEST(t.finished());
-    BOOST_TEST(t.shortest_ms() == 100);
-    BOOST_TEST(t.spent_ms() == 300);
+    BOOST_TEST(t.attempts() == 1U);
+    BOOST_TEST(t.shortest_ms() == 300);
+    BOOST_TEST(t.spent_ms() == 900);
     BOOST_TEST((sgd::divide(1'000, t.weights()) == std::vector<sgd::shard>{{0, 750}, {750, 250}}));
 }
 
 BOOST_AUTO_TEST_CASE(it_goes_on_until_no_shard_is_too_short) {
     dsgd::trial t{points, 2, work, {"a", "b"}};
-    t.take(done(t, {0.25, 1})); // 50 ms and 200 ms: within a quota, the first may have run all the time
+    t.take(done(t, {0.75, 3})); // 150 ms and 600 ms: within a quota, the first may have run almost all the time
     BOOST_TEST(!t.finished());
     BOOST_TEST(*t.attempt().shards()[0].what.epochs == 500U);
-    t.take(done(t, {0.5, 1}));
+    t.take(done(t, {1.5, 3}));
     BOOST_TEST(t.finished());
-    BOOST_TEST(t.shortest_ms() == 250);
-    BOOST_TEST(t.spent_ms() == 700);
+    BOOST_TEST(t.attempts() == 2U);
+    BOOST_TEST(t.shortest_ms() == 750);
+    BOOST_TEST(t.spent_ms() == 2'100);
     BOOST_TEST((sgd::divide(900, t.weights()) == std::vector<sgd::shard>{{0, 600}, {600, 300}}));
 }
 
-BOOST_AUTO_TEST_CASE(it_never_takes_more_than_the_work_itself) {
+BOOST_AUTO_TEST_CASE(it_never_takes_more_than_a_quarter_of_the_work) {
     dsgd::trial t{points, 1, {.epochs = 50}, {"a"}};
     BOOST_TEST(*t.attempt().shards()[0].what.epochs == 2U);
     t.take(done(t, {0.001}));
     BOOST_TEST(!t.finished());
-    BOOST_TEST(*t.attempt().shards()[0].what.epochs == 50U);
+    BOOST_TEST(*t.attempt().shards()[0].what.epochs == 12U);
     t.take(done(t, {0.001}));
     BOOST_TEST(t.finished());
 }
@@ -79,11 +81,17 @@ BOOST_AUTO_TEST_CASE(it_never_takes_more_than_the_work_itself) {
 BOOST_AUTO_TEST_CASE(shards_of_a_lost_node_stay_where_they_were_done) {
     dsgd::trial t{points, 2, work, {"a", "b"}};
     auto all = t.attempt();
-    all.done(0, part_of("a", 500, 200));
-    all.done(1, part_of("a", 500, 400));
+    const auto epochs = *all.shards()[0].what.epochs;
+    all.done(0, part_of("a", 500, 400));
+    all.done(1, part_of("a", 500, 5'000));
     t.take(all);
     BOOST_TEST((t.targets() == std::vector<std::string>{"a", "a"}));
+    BOOST_TEST(!t.finished()); // 5000 ms contain the time of the lost node
+    BOOST_TEST(*t.attempt().shards()[1].what.epochs == epochs);
+    t.take(done(t, {2, 4}));
+    BOOST_TEST(t.finished());
     BOOST_TEST(t.weights()[0] == t.weights()[1]);
+    BOOST_TEST(t.spent_ms() == 5'800);
 }
 
 BOOST_AUTO_TEST_SUITE_END()
