@@ -2,11 +2,19 @@
 #include "board.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace dsgd {
 
 using cles::errc;
+
+std::uint64_t least_points(const sgd::order& like) {
+    const auto epochs = static_cast<double>(like.epochs.value_or(1));
+    const auto steps = 5 / like.rate.value_or(sgd::schedule{}.rate);
+    constexpr double at_least = 500, more_than_any_data = 1e9;
+    return static_cast<std::uint64_t>(std::clamp(std::ceil(steps / epochs), at_least, more_than_any_data));
+}
 
 board::board(const std::vector<sgd::order>& orders, const std::vector<std::string>& targets)
     : slots_(orders.size()), targets_(targets), parts_(orders.size()), nodes_(targets.begin(), targets.end()) {
@@ -17,14 +25,14 @@ board::board(const std::vector<sgd::order>& orders, const std::vector<std::strin
 }
 
 board::board(std::uint64_t points, std::size_t slots, const sgd::order& like, const std::vector<std::string>& targets)
-    : slots_(slots), points_(points), targets_(targets), like_(like), splitter_(std::in_place, points, slots),
-      nodes_(targets.begin(), targets.end()) {}
+    : slots_(slots), points_(points), targets_(targets), like_(like),
+      splitter_(std::in_place, points, slots, least_points(like)), nodes_(targets.begin(), targets.end()) {}
 
-std::optional<std::size_t> board::next(std::size_t slot) {
+std::optional<std::size_t> board::next(std::size_t slot, double now_ms) {
     if (!splitter_) {
         return begun_.insert(slot).second ? std::optional{slot} : std::nullopt;
     }
-    const auto shard = failure_ ? sgd::shard{} : splitter_->next(slot);
+    const auto shard = failure_ ? sgd::shard{} : splitter_->next(slot, now_ms);
     if (shard.count == 0) {
         return {};
     }
@@ -32,9 +40,23 @@ std::optional<std::size_t> board::next(std::size_t slot) {
     what.first = shard.first;
     what.count = shard.count;
     what.seed = like_.seed.value_or(1) + shards_.size();
+    what.start = last_result(slot);
     shards_.push_back({.what = what, .target = target_of(slot), .slot = slot});
     parts_.emplace_back();
     return shards_.size() - 1;
+}
+
+bool board::finished() const {
+    return std::none_of(shards_.begin(), shards_.end(), [](const entry& e) { return e.fate == "open"; });
+}
+
+std::optional<sgd::classifier> board::last_result(std::size_t slot) const {
+    for (auto i = parts_.size(); i-- > 0;) {
+        if (shards_[i].slot == slot && shards_[i].fate == "done") {
+            return parts_[i].result;
+        }
+    }
+    return like_.start;
 }
 
 std::string board::target_of(std::size_t slot) const {
@@ -82,6 +104,11 @@ bool board::failed(std::size_t shard, const cles::error& why) {
     } else if (lost) {
         nodes_.erase(shard_entry.target);
         again = !nodes_.empty();
+        if (again && splitter_) {
+            shard_entry.fate = "lost";
+            splitter_->lost(shard_entry.slot);
+            return true;
+        }
         shard_entry.target = again ? least_loaded() : shard_entry.target;
     }
     if (!again || shard_entry.trouble.size() == max_attempts) {

@@ -16,7 +16,7 @@ struct entry {
     sgd::order what{};
     std::string target{};               ///< the node that is or was asked last, or `any`
     std::size_t slot = 0;               ///< whose shards are trained one after the other
-    std::string fate = "open";          ///< or done, failed, withdrawn
+    std::string fate = "open";          ///< or done, lost (its points are in other shards), failed, withdrawn
     std::vector<std::string> trouble{}; ///< node and reason of each failed attempt
 };
 BOOST_DESCRIBE_STRUCT(entry, (), (what, target, slot, fate, trouble))
@@ -29,6 +29,11 @@ struct times {
 };
 BOOST_DESCRIBE_STRUCT(times, (), (elapsed_ms, longest_ms, overhead_ms))
 
+/// The least points of a shard that is trained on for itself: 500, whose best classifier is almost that of all points,
+/// and enough for 5 steps per unit of the rate's reciprocal. A descent needs these to forget where it began, when the
+/// points have the variance 1.
+std::uint64_t least_points(const sgd::order& like);
+
 /// Assigns shards to nodes, again when a node fails. It only decides; its caller sends and waits.
 class board {
   public:
@@ -37,7 +42,7 @@ class board {
     /// A slot for each order.
     /// \param targets the nodes, in turn; none: each shard goes to `any`
     board(const std::vector<sgd::order>& orders, const std::vector<std::string>& targets);
-    /// Shards that are made while others are trained.
+    /// Shards that are made while others are trained. A slot's next one goes on from the result of its last one.
     /// \param points are divided among the slots
     /// \param like   what all orders have in common; its seed is that of the first
     board(std::uint64_t points, std::size_t slots, const sgd::order& like, const std::vector<std::string>& targets);
@@ -45,11 +50,14 @@ class board {
     [[nodiscard]] std::size_t slots() const noexcept { return slots_; }
     /// Of all shards together, even those that are not made yet.
     [[nodiscard]] std::uint64_t points() const noexcept { return points_; }
-    /// The shard that the slot trains next; none if it has nothing left to do.
-    std::optional<std::size_t> next(std::size_t slot);
+    /// The shard that the slot trains next; none if it has nothing to do, until another one's shard is lost.
+    /// \param now_ms since the beginning of all
+    std::optional<std::size_t> next(std::size_t slot, double now_ms);
+    /// No slot has anything to do any more.
+    [[nodiscard]] bool finished() const;
 
     [[nodiscard]] const std::vector<entry>& shards() const noexcept { return shards_; }
-    /// The results.
+    /// The results; without points where there is none.
     [[nodiscard]] const std::vector<sgd::trained>& parts() const noexcept { return parts_; }
     /// The reason of the first shard that could not be done.
     [[nodiscard]] const std::optional<cles::error>& failure() const noexcept { return failure_; }
@@ -58,14 +66,16 @@ class board {
 
     /// \param part with `after_ms`
     void done(std::size_t shard, const sgd::trained& part);
-    /// \return whether to delegate it again, to the present `target`. Training twice does no harm: a shard whose node
-    /// is lost goes to the node with the fewest shards; a busy node is asked again. Otherwise it has failed, or was
-    /// withdrawn because another one has.
+    /// Training twice does no harm: if the node is lost, the shard is divided again if shards are made while others are
+    /// trained, or else goes to the node with the fewest shards. A busy node is asked again. Otherwise it has failed,
+    /// or was withdrawn because another one has.
+    /// \return false in the last case; otherwise it is to be delegated again, to the present `target`, if it is open
     bool failed(std::size_t shard, const cles::error& why);
 
   private:
     [[nodiscard]] std::string target_of(std::size_t slot) const;
     [[nodiscard]] std::string least_loaded() const;
+    [[nodiscard]] std::optional<sgd::classifier> last_result(std::size_t slot) const;
 
     std::size_t slots_;
     std::uint64_t points_ = 0;

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/url.hpp>
+
 #include "local.hpp"
 #include "pool.hpp"
 #include "sgd/parallel.hpp"
@@ -6,12 +8,16 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <cstdio>
 
 namespace {
 
+constexpr std::size_t default_shards = 4;
+
 struct arguments {
-    std::size_t shards = 4, threads = 0;
+    std::optional<std::size_t> shards{};
+    std::size_t threads = 0;
     std::vector<std::string> seeds{"tcp://127.0.0.1:25370"}, nodes{};
     std::uint64_t epochs = 100, seed = 1, deadline_s = 60;
     double rate = 1e-4;
@@ -22,13 +28,15 @@ struct report {
     std::string error{};
     double trial_ms = 0;          ///< contained in the elapsed time
     double trial_shortest_ms = 0; ///< the least time of a shard by which speeds were measured
+    std::uint64_t trial_attempts = 0;
     dsgd::times times{};
     sgd::classifier result{};
     sgd::quality quality{};
     std::vector<dsgd::entry> shards{};
     std::vector<sgd::trained> parts{};
 };
-BOOST_DESCRIBE_STRUCT(report, (), (error, trial_ms, trial_shortest_ms, times, result, quality, shards, parts))
+BOOST_DESCRIBE_STRUCT(report, (),
+                      (error, trial_ms, trial_shortest_ms, trial_attempts, times, result, quality, shards, parts))
 
 int report_failure(const cles::error& why) {
     const auto code = why.code();
@@ -43,6 +51,7 @@ int report_result(const arguments& args, const sgd::data_set& data, const dsgd::
     if (before != nullptr) {
         out.trial_ms = before->spent_ms();
         out.trial_shortest_ms = before->shortest_ms();
+        out.trial_attempts = before->attempts();
     }
     if (all.failure()) {
         out.error = all.failure()->message();
@@ -82,32 +91,49 @@ int run_local(const arguments& args, const sgd::order& setup) {
     return report_result(args, data, all);
 }
 
-int run(const arguments& args, sgd::order setup) {
-    dsgd::pool pool{args.seeds, std::chrono::seconds{args.deadline_s}, !args.json};
-    auto targets = args.nodes;
-    const auto offered = pool.find();
-    for (const auto& [node, data] : offered) {
-        if (args.nodes.empty() && (args.weighted || args.resplit)) {
-            targets.push_back(node);
-        }
-        setup.data = data; // a node with other data refuses
-    }
-    for (const auto& node : targets) {
+/// What the data of all these nodes is made from.
+sgd::recipe common_data(const std::map<std::string, sgd::recipe>& offered, const std::vector<std::string>& nodes) {
+    for (const auto& node : nodes) {
         if (!offered.contains(node)) {
             throw cles::error(cles::errc::no_target, "'" + node + "' does not offer 'sgd': see cles ls --tasks");
         }
+        if (const auto& first = offered.at(nodes.front()), &data = offered.at(node); data != first) {
+            throw cles::error(cles::errc::bad_request, "'" + nodes.front() + "' and '" + node +
+                                                           "' have different data: " + to_string(first) + ", and " +
+                                                           to_string(data) + ". Name nodes with the same (--nodes)");
+        }
     }
+    return offered.at(nodes.front());
+}
+
+int run(const arguments& args, sgd::order setup) {
+    dsgd::pool pool{args.seeds, std::chrono::seconds{args.deadline_s}, !args.json};
+    const auto offered = pool.find();
+    auto nodes = args.nodes;
+    for (const auto& each : offered) {
+        if (args.nodes.empty()) {
+            nodes.push_back(each.first);
+        }
+    }
+    setup.data = common_data(offered, nodes);
     const sgd::data_set data{*setup.data};
+    const bool by_speed = args.weighted || args.resplit;
+    const auto targets = args.nodes.empty() && !by_speed ? std::vector<std::string>{} : nodes;
+    const auto shards = args.shards.value_or(by_speed ? std::max(default_shards, targets.size()) : default_shards);
+    if (shards < targets.size()) {
+        std::fprintf(stderr, "cles-dsgd: %zu nodes have nothing to do: there are only %zu shards\n",
+                     targets.size() - shards, shards);
+    }
     if (args.resplit) {
-        dsgd::board all{data.size(), args.shards, setup, targets};
+        dsgd::board all{data.size(), shards, setup, targets};
         pool.train(all);
         return report_result(args, data, all);
     }
     if (args.weighted) {
-        dsgd::trial before{data.size(), args.shards, setup, targets};
+        dsgd::trial before{data.size(), shards, setup, targets};
         while (!before.finished()) {
             auto attempt = before.attempt();
-            pool.train(attempt);
+            pool.train(attempt, "trial, ");
             if (attempt.failure()) {
                 return report_result(args, data, attempt);
             }
@@ -117,9 +143,18 @@ int run(const arguments& args, sgd::order setup) {
         pool.train(all);
         return report_result(args, data, all, &before);
     }
-    dsgd::board all{orders_for(sgd::divide(data.size(), std::vector<double>(args.shards, 1)), setup), targets};
+    dsgd::board all{orders_for(sgd::divide(data.size(), std::vector<double>(shards, 1)), setup), targets};
     pool.train(all);
     return report_result(args, data, all);
+}
+
+std::string wrong_url(const std::string& text) {
+    try {
+        cles::parse_url(text);
+        return {};
+    } catch (const cles::error& e) {
+        return e.message();
+    }
 }
 
 } // namespace
@@ -128,19 +163,30 @@ int main(int argc, char** argv) {
     arguments args;
     CLI::App app{"Distributed stochastic gradient descent: delegates shards of a data set, and averages.", "cles-dsgd"};
     app.footer("Exit codes: 0 ok, 2 usage, 3 no node or no task, 4 deadline, 5 another error, 6 busy.");
-    app.add_option("-k,--shards", args.shards, "Number of shards, or with -r of those at one time (4)")
-        ->check(CLI::Range(1, 1024));
-    app.add_option("--at", args.seeds, "A node that knows the others (tcp://127.0.0.1:25370)")->type_name("URL");
-    app.add_option("-n,--nodes", args.nodes, "The nodes that train, in turn (default any)")->delimiter(',');
+    auto* shards = app.add_option("-k,--shards", args.shards,
+                                  "Number of shards, or with -r of those at one time (4; with -w or -r at least the "
+                                  "number of nodes)")
+                       ->check(CLI::Range(1, 1024));
+    auto* at = app.add_option("--at", args.seeds, "A node that knows the others (tcp://127.0.0.1:25370)")
+                   ->type_name("URL")
+                   ->check(wrong_url);
+    auto* nodes = app.add_option("-n,--nodes", args.nodes, "The nodes that train, in turn (default any)");
+    nodes->delimiter(',');
     auto* weighted =
         app.add_flag("-w,--weighted", args.weighted, "Measure the nodes first; faster ones get larger shards");
-    app.add_flag("-r,--resplit", args.resplit, "Divide what is left while the nodes work, by how fast they are")
-        ->excludes(weighted);
-    app.add_option("--local", args.threads, "Train here, in this number of threads")->check(CLI::Range(1, 1024));
+    auto* resplit =
+        app.add_flag("-r,--resplit", args.resplit, "Divide what is left while the nodes work, by how fast they are")
+            ->excludes(weighted);
+    auto* local =
+        app.add_option("--local", args.threads, "Train here, in this number of threads")->check(CLI::Range(1, 1024));
     app.add_option("-e,--epochs", args.epochs, "Steps for each point (100)")->check(CLI::Range(1, 1'000'000));
     app.add_option("--rate", args.rate, "Size of a step (0.0001)")->check(CLI::PositiveNumber);
     app.add_option("--seed", args.seed, "Seed of the random numbers (1)");
-    app.add_option("--deadline", args.deadline_s, "Deadline of a shard in seconds (60)")->check(CLI::Range(1, 86'400));
+    auto* deadline = app.add_option("--deadline", args.deadline_s, "Deadline of a shard in seconds (60)")
+                         ->check(CLI::Range(1, 86'400));
+    for (auto* of_nodes : {shards, at, nodes, weighted, resplit, deadline}) {
+        local->excludes(of_nodes);
+    }
     app.add_flag("--json", args.json, "Print a JSON object, and no progress");
     try {
         app.parse(argc, argv);
@@ -150,5 +196,8 @@ int main(int argc, char** argv) {
         return app.exit(error) == 0 ? 0 : 2;
     } catch (const cles::error& e) {
         return report_failure(e);
+    } catch (const std::exception& e) {
+        std::fprintf(stderr, "cles-dsgd: %s\n", e.what());
+        return 5;
     }
 }

@@ -2,10 +2,11 @@
 #include "pool.hpp"
 
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/detached.hpp>
+#include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 
 #include <cstdio>
+#include <exception>
 #include <utility>
 
 #include <unistd.h>
@@ -21,14 +22,18 @@ BOOST_DESCRIBE_STRUCT(offers, (), (results))
 
 struct pool::round {
     board& all;
-    std::size_t open;             ///< slots that may have more to do
+    const char* what;
+    boost::asio::steady_timer changed; ///< cancelled when a shard has ended: slots without one wait for that
+    std::size_t open;                  ///< slots that may have more to do
+    std::exception_ptr crash{};
     std::vector<double> progress; ///< of the shard of each slot, in points
     double done = 0;              ///< of all, in points
     double reported = 0;          ///< in percent
     char end_of_line = ::isatty(STDERR_FILENO) == 1 ? '\r' : '\n';
     steady::time_point begun = steady::now();
 
-    explicit round(board& what) : all(what), open(what.slots()), progress(what.slots()) {}
+    round(boost::asio::io_context& io, board& work, const char* called)
+        : all(work), what(called), changed(io, steady::time_point::max()), open(work.slots()), progress(work.slots()) {}
 
     double ms() const { return std::chrono::duration<double, std::milli>(steady::now() - begun).count(); }
 
@@ -38,7 +43,7 @@ struct pool::round {
         done += points - std::exchange(progress[entry.slot], points);
         if (const auto percent = done / static_cast<double>(all.points()) * 100; percent >= reported + 10) {
             reported = percent;
-            std::fprintf(stderr, "cles-dsgd: %2.0f %% of %ju points%c", percent, std::uintmax_t{all.points()},
+            std::fprintf(stderr, "cles-dsgd: %s%2.0f %% of %ju points%c", what, percent, std::uintmax_t{all.points()},
                          end_of_line);
         }
     }
@@ -62,22 +67,35 @@ std::map<std::string, sgd::recipe> pool::find() {
     }
 }
 
-void pool::train(board& all) {
-    round now{all};
+void pool::train(board& all, const char* what) {
+    round now{io_, all, what};
     for (std::size_t slot = 0; slot < all.slots(); ++slot) {
-        boost::asio::co_spawn(io_, work(now, slot), boost::asio::detached);
+        boost::asio::co_spawn(io_, work(now, slot), [&now](const std::exception_ptr& crash) {
+            now.crash = now.crash ? now.crash : crash;
+            --now.open;
+        });
     }
     io_.restart();
-    while (now.open != 0 && io_.run_one() != 0) {
+    while (now.open != 0 && !now.crash && io_.run_one() != 0) {
+    }
+    if (now.crash) {
+        std::rethrow_exception(now.crash);
     }
 }
 
 boost::asio::awaitable<void> pool::work(round& now, std::size_t slot) {
-    while (const auto shard = now.all.next(slot)) {
-        now.progress[slot] = 0; // what it has done before counts in `done`
-        co_await delegate(now, *shard);
+    for (;;) {
+        if (const auto shard = now.all.next(slot, now.ms())) {
+            now.progress[slot] = 0; // what it has done before counts in `done`
+            co_await delegate(now, *shard);
+            now.changed.cancel();
+        } else if (now.all.finished()) {
+            co_return;
+        } else { // another slot's shard may be lost
+            boost::system::error_code cancelled;
+            co_await now.changed.async_wait(boost::asio::redirect_error(boost::asio::use_awaitable, cancelled));
+        }
     }
-    --now.open;
 }
 
 boost::asio::awaitable<void> pool::delegate(round& now, std::size_t i) {
@@ -98,8 +116,13 @@ boost::asio::awaitable<void> pool::delegate(round& now, std::size_t i) {
         }
         if (failure && now.all.failed(i, *failure)) {
             const auto& shard = now.all.shards()[i];
-            std::fprintf(stderr, "cles-dsgd: shard %zu: %s; retrying at %s\n", i + 1, shard.trouble.back().c_str(),
-                         shard.target.c_str());
+            const bool lost = shard.fate == "lost";
+            std::fprintf(stderr, "cles-dsgd: shard %zu: %s; %s%s\n", i + 1, shard.trouble.back().c_str(),
+                         lost ? "its points are divided again" : "retrying at ", lost ? "" : shard.target.c_str());
+            if (lost) {
+                now.report_progress(i, 0);
+                co_return;
+            }
             boost::asio::steady_timer pause{io_, std::chrono::milliseconds{20}};
             co_await pause.async_wait(boost::asio::use_awaitable);
         } else if (failure) {

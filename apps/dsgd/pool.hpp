@@ -20,7 +20,8 @@ class pool {
     /// The nodes that offer the task, with the recipe of their data. \throws cles::error that says what is missing
     std::map<std::string, sgd::recipe> find();
     /// Delegates the shards of all slots at once, those of a slot one after the other. Returns when all have ended.
-    void train(board& all);
+    /// \param what "trial, ", before progress
+    void train(board& all, const char* what = "");
 
   private:
     struct round;

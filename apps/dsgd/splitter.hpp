@@ -11,34 +11,44 @@ namespace dsgd {
 
 /// Divides points while they are trained on, among slots whose speeds only show then (weighted factoring: Hummel,
 /// Schmidt, Uma and Wein, "Load-sharing in heterogeneous systems via weighted factoring", 1996). A slot trains one
-/// shard at a time. Each shard takes half of the time that is left if all work at their last speeds, so shards become
-/// smaller, and all slots end at almost the same time, even if speeds change.
+/// shard at a time. Each shard takes a part of the time that is left if all work at their last speeds, so shards become
+/// smaller, and all slots end at almost the same time. A slot that becomes slower during a shard, whichever one that
+/// is, still has to end it; the smaller that part, the less the others wait.
 class splitter {
   public:
-    /// The first shard of a slot is this part of an even share: the speeds are not known yet.
-    static constexpr std::uint64_t first_part = 8;
-    /// Shards take at least so long, because each costs a round trip. Only those at the end may take a quarter of it.
-    static constexpr double least_ms = 20;
+    /// The first shard of a slot is an even share, divided by this: the speeds are not known yet.
+    static constexpr std::uint64_t first_divisor = 8;
+    /// A later one takes the time that is left, divided by this.
+    static constexpr double rest_divisor = 4;
+    /// But it takes at least so long, because each costs a round trip. At the end, a quarter of it is enough.
+    static constexpr double least_shard_ms = 20;
 
-    /// \param slots at least 1
-    splitter(std::uint64_t points, std::size_t slots);
+    /// \param slots        at least 1
+    /// \param least_points that a shard has, unless fewer are left
+    splitter(std::uint64_t points, std::size_t slots, std::uint64_t least_points = 1);
 
-    /// What the slot trains next; empty if nothing is left.
-    sgd::shard next(std::size_t slot);
-    /// The slot has trained its shard. \param now_ms since the beginning of all
+    /// What the slot trains from now on; empty if nothing is left.
+    /// \param now_ms since the beginning of all
+    sgd::shard next(std::size_t slot, double now_ms);
+    /// The slot has trained its shard.
     void done(std::size_t slot, double now_ms);
+    /// The slot will not train its shard: all slots divide it again. It begins anew, because its node is another.
+    void lost(std::size_t slot);
 
   private:
     struct slot_state {
         double begun_ms = 0;
-        double points = 0; ///< of its shard
-        double speed = 0;  ///< of the last shard, in points per millisecond; 0 if there is none
+        double speed = 0; ///< of the last shard, in points per millisecond; 0 if there is none
+        sgd::shard shard{};
     };
 
     [[nodiscard]] double wanted(const slot_state& slot) const;
+    [[nodiscard]] double least(const slot_state& slot) const;
 
     std::uint64_t points_;
-    std::uint64_t next_ = 0;
+    double least_points_;
+    std::uint64_t left_;
+    std::vector<sgd::shard> open_; ///< ranges that no slot has or had
     std::vector<slot_state> slots_;
 };
 
