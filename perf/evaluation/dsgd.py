@@ -33,8 +33,9 @@ from result_file import write
 
 SAME_MSE = 1e-9
 MOST_EPOCHS = 1_000_000
+LEAST_STEPS = 50_000  # of a shard: with fewer, the classifier is still near its start
 SHARDS_MS = (1, 3, 10, 30, 100, 300, 1000)  # sizes for the curve, below that of the rows
-OF_SIZES = ("local_all_near", "near_asked_by_near", "beside_asked_by_far", "both_asked_by_far", "both_resplit")
+OF_SIZES = ("local_all_near", "near_asked_by_near", "near_reduced_asked_by_far", "both_asked_by_far", "both_resplit")
 
 
 class Daemon:
@@ -70,20 +71,20 @@ class Daemon:
 def rows_of(hosts, urls, threads):
     """{name: (what it is, where the manager runs, its arguments)}"""
     def asked(who, node, shards, *more):
-        return who, ["--at", urls[node], "--nodes", f"beside,{node}" if node == "far" else node, "-k", str(shards),
+        return who, ["--at", urls[node], "--nodes", f"near_reduced,{node}" if node == "far" else node, "-k", str(shards),
                      "--deadline", "600", *more]
 
-    beside = hosts.near.on(hosts.others)
+    near_reduced = hosts.near.on(hosts.others)
     return {
         "local_one_near": ("1 thread, first host", hosts.near, ["--local", "1"]),
         "local_one_far": ("1 thread, second host", hosts.far, ["--local", "1"]),
         "local_all_near": (f"{threads} threads, first host", hosts.near, ["--local", str(threads)]),
         "local_all_far": (f"{threads} threads, second host", hosts.far, ["--local", str(threads)]),
-        "local_all_beside": (f"{threads} threads, first host less one core", beside, ["--local", str(threads)]),
+        "local_all_near_reduced": (f"{threads} threads, first host less one core", near_reduced, ["--local", str(threads)]),
         "near_asked_by_near": (f"{threads} on the first host, asked from there", *asked(hosts.near, "near", threads)),
         "near_asked_by_far": (f"{threads} on the first host, asked from the second", *asked(hosts.far, "near", threads)),
-        "beside_asked_by_far": (f"{threads} on the first less one core, asked from the second",
-                                *asked(hosts.far, "beside", threads)),
+        "near_reduced_asked_by_far": (f"{threads} on the first less one core, asked from the second",
+                                      *asked(hosts.far, "near_reduced", threads)),
         "both_asked_by_far": (f"{threads} on each host, even", *asked(hosts.far, "far", 2 * threads)),
         "both_weighted": (f"{threads} on each host, by speed", *asked(hosts.far, "far", 2 * threads, "--weighted")),
         "both_resplit": (f"{threads} on each host, re-split", *asked(hosts.far, "far", 2 * threads, "--resplit")),
@@ -110,6 +111,11 @@ def epochs_for(programs, host, threads, work_ms):
         epochs = wanted
 
 
+def least_epochs(threads):
+    """So many that even shards on both hosts have enough steps."""
+    return math.ceil(LEAST_STEPS * 2 * threads / (2 * dsgd_points.PER_CLASS))
+
+
 class Daemons:
     """Those that the rows need, on both hosts."""
 
@@ -117,8 +123,8 @@ class Daemons:
         self.folder = tempfile.mkdtemp(prefix="cles-dsgd-")
         self.daemons, self.urls = [], {}
         try:
-            # `beside`: the first host without the core of the second, for work on both.
-            for name, host in (("near", hosts.near), ("beside", hosts.near.on(hosts.others)), ("far", hosts.far)):
+            # `near_reduced`: the first host without the core of the second, for work on both.
+            for name, host in (("near", hosts.near), ("near_reduced", hosts.near.on(hosts.others)), ("far", hosts.far)):
                 self.daemons.append(Daemon(programs, host, name, threads, list(self.urls.values())[:1], self.folder))
                 self.urls[name] = self.daemons[-1].url
         except BaseException:
@@ -152,8 +158,10 @@ def rounds_of(programs, rows, epochs, runs, what):
 def size_result(epochs, reports):
     """One point of the curve: overhead and speed-up for shards of this size."""
     ms = {name: [each["times"]["elapsed_ms"] for each in found] for name, found in reports.items()}
-    local, near, alone = ms["local_all_near"], ms["near_asked_by_near"], ms["beside_asked_by_far"]
-    return {"epochs": epochs, "shard_ms": summary([each["times"]["longest_ms"] for each in reports["local_all_near"]]),
+    qualities = [each["quality"] for found in reports.values() for each in found]
+    local, near, alone = ms["local_all_near"], ms["near_asked_by_near"], ms["near_reduced_asked_by_far"]
+    return {"epochs": epochs, "mse_ratio": max(each["mse"] / each["least_mse"] for each in qualities),
+            "work_ms": summary(local), "shard_ms": summary([each["times"]["longest_ms"] for each in reports["local_all_near"]]),
             "delegate_less_local_ms": summary([a - b for a, b in zip(near, local)]),
             "share": summary([(a - b) / b * 100 for a, b in zip(near, local)]),
             "strict_share": summary([each["times"]["overhead_ms"] / b * 100
@@ -193,14 +201,15 @@ def row_result(name, meaning, reports):
     return result
 
 
-def checks_of(rows, points):
+def checks_of(rows, curve, points):
     by_name = {row["name"]: row for row in rows}
-    same = [by_name[name] for name in ("local_all_near", "local_all_far", "local_all_beside", "near_asked_by_near",
-                                       "near_asked_by_far", "beside_asked_by_far")]
+    same = [by_name[name] for name in ("local_all_near", "local_all_far", "local_all_near_reduced", "near_asked_by_near",
+                                       "near_asked_by_far", "near_reduced_asked_by_far")]
     errors = {f"{mse:.6g}" for row in same for mse in row["mse"]}
     again = all(abs(dsgd_points.mean_squared_error(points, each) - each["mse"]) < SAME_MSE
                 for row in rows for each in row["classifiers"])
-    return {"same_mse_to_6_digits": len(errors) == 1, "mse_found_again": again}
+    good = all(each["mse_ratio"] <= dsgd_figures.WANTED_MSE_RATIO for each in curve)
+    return {"same_mse_to_6_digits": len(errors) == 1, "mse_found_again": again, "sizes_near_least_mse": good}
 
 
 def figures_of(rows, curve, checks, hosts, threads):
@@ -208,14 +217,17 @@ def figures_of(rows, curve, checks, hosts, threads):
             dsgd_figures.yes_or_no("same_mse", "rows of the same shards have the same error, to 6 digits",
                                    checks["same_mse_to_6_digits"]),
             dsgd_figures.yes_or_no("mse_found_again", "each error is found again by a program that makes the data a second "
-                                   "time, to 1e-9", checks["mse_found_again"])]
+                                   "time, to 1e-9", checks["mse_found_again"]),
+            dsgd_figures.yes_or_no("sizes_near_least_mse", "each size of the curve gives a classifier with at most "
+                                   f"{dsgd_figures.WANTED_MSE_RATIO:g} times the least error", checks["sizes_near_least_mse"])]
 
 
 def notes(hosts, epochs):
     yield f"The work is {epochs} steps for each of {2 * dsgd_points.PER_CLASS} points, in all rows."
-    if hosts.quota:
-        yield (f"The second host has one core, and {hosts.quota:.0%} of its time in periods of {hosts.period_ms:g} ms. In rows "
-               "with both hosts, the first does not have that core.")
+    part = f", and {hosts.quota:.0%} of its time in periods of {hosts.period_ms:g} ms" if hosts.quota else ""
+    yield (f"The second host has one core{part}. " + ("In rows with both hosts, the first does not have that core."
+                                                       if hosts.others != hosts.far.cores else
+                                                       "There is no other one, so the first host shares it in all rows."))
 
 
 def main():
@@ -240,10 +252,10 @@ def main():
         epochs = options.epochs or epochs_for(options.programs, hosts.near, options.threads, options.work)
         sizes = [1, 3] if options.quick else [math.ceil(epochs * each / options.work) for each in SHARDS_MS]
         rows, curve = measure(options.programs, hosts, options.threads, epochs, options.runs,
-                              sorted({each for each in sizes if each < epochs}))
+                              sorted({each for each in sizes if least_epochs(options.threads) <= each < epochs}))
         points = dsgd_points.made()
         averaged = next(row["classifiers"][0] for row in rows if row["name"] == "near_asked_by_near")
-        checks = checks_of(rows, points)
+        checks = checks_of(rows, curve, points)
         result = {"what": "distributed stochastic gradient descent (section 4.2, Table 2)",
                   "figures": figures_of(rows, curve, checks, hosts, options.threads), "rows": rows, "sizes": curve,
                   "checks": checks,

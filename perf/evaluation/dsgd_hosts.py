@@ -27,6 +27,7 @@ class Host:
 class Hosts:
     """`near` is this machine with all its cores; `far` has the last of them, and `quota` of its time."""
 
+    # Less than the kernel's 100 ms, so that shards of some 10 ms take their share of the time, not all or nothing.
     PERIOD_US = 10_000
 
     def __init__(self, quota):
@@ -39,11 +40,13 @@ class Hosts:
         self.near = Host(near, cores, keepers[0] if keepers else None)
         self.far = Host(far, cores[-1:], keepers[1] if keepers else None, self.group)
         self.others = cores[:-1] or cores  # all but the core of the second host
+        if len(cores) == 1:
+            self.missing.append("a core of its own for the second host: both share the only one")
         self.quota, self.period_ms = (quota, self.PERIOD_US / 1000) if self.group else (None, None)
 
     def described(self):
         return {"namespaces": bool(self.keepers), "cores": self.near.cores, "far_cores": self.far.cores,
-                "far_quota": self.quota, "far_period_ms": self.period_ms, "near_cores_beside_far": self.others,
+                "far_quota": self.quota, "far_period_ms": self.period_ms, "near_reduced_cores": self.others,
                 "not_allowed": self.missing}
 
     def _make_namespaces(self):

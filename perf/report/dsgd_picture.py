@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSL-1.0
 """The pictures of distributed stochastic gradient descent: Table 2 as speed-ups, what DELEGATE costs and what a second host
-gains as ratios, both by the size of the shards; the data set with its classifier, and a detail of it at the boundary
-between the classes (Figs. 5 and 6)."""
+gains as ratios, also by the size of the shards or of the work; the data set with its classifier, and a detail of it at the
+boundary between the classes (Figs. 5 and 6)."""
 
 import statistics
 
@@ -13,12 +13,13 @@ def kinds(raw, note):
         ("dsgd", "Table 2 as speed-ups over one thread on the first host, drawn as a share of the most that the cores of the row "
          "could reach by the speed of one thread. The paper's machines ran 4 threads each.", lambda: speed_ups(raw, note)),
         ("dsgd_cost", "What DELEGATE costs: elapsed time to that of threads on the same cores without CLES; for both hosts, to "
-         "threads on both without any loss. 1 is the least. The trial before shards by speed is a part of its bar.",
-         lambda: costs(raw, note))]
+         "threads on both without any loss. 1 means no cost; less is chance. The trial before shards by speed is a part of "
+         "its bar.", lambda: costs(raw, note))]
     if raw.get("sizes"):
-        shown.append(("dsgd_sizes", "By the size of the shards, which is the time of one without CLES. Left: what DELEGATE adds "
-                      "on the same host (values of zero or less are not drawn). Right: how many times faster both hosts are than "
-                      "the first alone. Medians, with their 95 % intervals.", lambda: sizes(raw, note)))
+        shown.append(("dsgd_sizes", "Left: what DELEGATE adds on the same host, by the time of a shard without CLES (values of "
+                      "zero or less are not drawn). Right: how many times faster both hosts are than the first alone, by the "
+                      "amount of work, which is divided into more shards there. Medians, with their 95 % intervals.",
+                      lambda: sizes(raw, note)))
     if "pictured" in raw:
         data = raw["pictured"]
         shown += [
@@ -110,15 +111,18 @@ plot {', '.join(parts)}
 
 
 def sizes(raw, note):
-    def column(key):
-        return [(each["shard_ms"]["median"], *(each[key][end] for end in ("median", "low", "high"))) for each in raw["sizes"]]
+    def column(key, of):
+        return [(each[of]["median"], *(each[key][end] for end in ("median", "low", "high"))) for each in raw["sizes"]]
 
     def positive(key):
-        return [(x, *(value if value > 0 else None for value in values)) for x, *values in column(key)]
+        return [(x, *(value if value > 0 else None for value in values)) for x, *values in column(key, "shard_ms")]
 
-    lines = {"paper": positive("share"), "strict": positive("strict_share"), "even": column("gain_even"),
-             "resplit": column("gain_resplit")}
-    ends = [row[0] for row in lines["even"]]
+    def ends(line):
+        found = [row[0] for row in lines[line]]
+        return f"[{min(found) / 1.5}:{max(found) * 1.5}]"
+
+    lines = {"paper": positive("share"), "strict": positive("strict_share"), "even": column("gain_even", "work_ms"),
+             "resplit": column("gain_resplit", "work_ms")}
     titles = {"paper": "DELEGATE less local threads (the paper''s)", "strict": "elapsed less the longest shard''s own time",
               "even": "even shards", "resplit": "re-split"}
 
@@ -128,7 +132,7 @@ def sizes(raw, note):
 
     most = next((each["value"] for each in raw["figures"] if each["name"] == "gain_most"), 1)
     return draw("dsgd_sizes", "".join(block(name, rows) for name, rows in lines.items()) + f"""set logscale x
-set xrange [{min(ends) / 1.5}:{max(ends) * 1.5}]
+set xrange {ends("paper")}
 set xlabel 'time of a shard, ms'
 set tmargin at screen 0.7
 set bmargin at screen 0.2
@@ -142,7 +146,9 @@ set format y '%g'
 plot {plot("paper", "strict")}
 unset label
 unset logscale y
+set xrange {ends("even")}
 set yrange [0:*]
+set xlabel 'the work: time of all threads of the first host, ms'
 set lmargin at screen 0.56
 set rmargin at screen 0.97
 set key at screen 0.56,0.97 left top Left reverse samplen 3

@@ -23,21 +23,22 @@ import dsgd_points  # noqa: E402
 import interval  # noqa: E402
 import reported  # noqa: E402
 
-ROWS = ["local_one_near", "local_one_far", "local_all_near", "local_all_far", "local_all_beside", "near_asked_by_near",
-        "near_asked_by_far", "beside_asked_by_far", "both_asked_by_far", "both_weighted", "both_resplit"]
+ROWS = ["local_one_near", "local_one_far", "local_all_near", "local_all_far", "local_all_near_reduced", "near_asked_by_near",
+        "near_asked_by_far", "near_reduced_asked_by_far", "both_asked_by_far", "both_weighted", "both_resplit"]
 
 
 class Table(unittest.TestCase):
     def test_every_row_is_measured(self):
         with tempfile.TemporaryDirectory() as folder:
             output = Path(folder) / "dsgd.json"
-            done = subprocess.run([sys.executable, "-B", f"{FOLDER}/dsgd.py", "--quick", "--programs", PROGRAMS,
-                                   "-o", str(output)], capture_output=True, text=True, check=False)
+            done = subprocess.run([sys.executable, "-B", f"{FOLDER}/dsgd.py", "--quick", "--threads", "2",
+                                   "--programs", PROGRAMS, "-o", str(output)], capture_output=True, text=True, check=False)
             self.assertEqual(done.returncode, 0, done.stderr)
             result = json.loads(output.read_text(encoding="utf-8"))
         self.assertEqual([row["name"] for row in result["rows"]], ROWS)
         self.assertTrue(result["checks"]["same_mse_to_6_digits"])
         self.assertTrue(result["checks"]["mse_found_again"])
+        self.assertTrue(result["checks"]["sizes_near_least_mse"])
         self.assertTrue(all(abs(x) < 1 and abs(y) < 1 for x, y, _ in result["pictured"]["near"]))
         self.assertEqual({of_class for _, _, of_class in result["pictured"]["some"]}, {0, 1})
         for row in result["rows"]:
@@ -54,11 +55,16 @@ class Table(unittest.TestCase):
         for row in (weighted, rows["both_resplit"]):
             for points in row["points"]:
                 self.assertEqual(sum(count for _, count in points), 200_000)
-                self.assertLessEqual({node for node, _ in points}, {"beside", "far"})
+                self.assertLessEqual({node for node, _ in points}, {"near_reduced", "far"})
         self.assertEqual([each["epochs"] for each in result["sizes"]], [1, 3, 10])
         for each in result["sizes"]:
             self.assertGreater(each["shard_ms"]["median"], 0)
             self.assertGreater(each["gain_resplit"]["median"], 0)
+            self.assertGreater(each["work_ms"]["median"], 0)
+            self.assertGreaterEqual(each["mse_ratio"], 1)
+            self.assertLessEqual(each["mse_ratio"], 1.01)
+        figures = {each["name"]: each for each in result["figures"]}
+        self.assertGreaterEqual(figures["mse_ratio"]["value"], max(each["mse_ratio"] for each in result["sizes"]))
         reported.check(self, "dsgd", result)
         if result["hosts"]["far_quota"] is None:
             self.assertTrue(any("quota" in text for text in result["hosts"]["not_allowed"]))
@@ -68,12 +74,13 @@ class Table(unittest.TestCase):
             return {"name": name, "meaning": name, "elapsed_all_ms": elapsed, "elapsed_ms": interval.summary(elapsed),
                     "mse": [0.0189, 0.019], "least_mse": 0.0189, "overhead_all_ms": list(overhead)}
 
-        hosts = {"cores": [0, 1, 2, 3], "far_cores": [0, 1, 2, 3], "near_cores_beside_far": [0, 1, 2, 3], "far_period_ms": 10.0}
+        hosts = {"cores": [0, 1, 2, 3], "far_cores": [0, 1, 2, 3], "near_reduced_cores": [0, 1, 2, 3], "far_period_ms": 10.0}
         # The paper's own table: the differences and ratios have to be the paper's.
         paper = dsgd_figures.PAPER_MS
         rows = [row(name, [float(paper.get(name, 2000.0))] * 3, [4.0] * 3) for name in ROWS]
-        rows[ROWS.index("local_all_beside")] = row("local_all_beside", [float(paper["local_all_near"])] * 3)
-        rows[ROWS.index("beside_asked_by_far")] = row("beside_asked_by_far", [float(paper["near_asked_by_far"])] * 3, [4.0] * 3)
+        rows[ROWS.index("local_all_near_reduced")] = row("local_all_near_reduced", [float(paper["local_all_near"])] * 3)
+        rows[ROWS.index("near_reduced_asked_by_far")] = row("near_reduced_asked_by_far",
+                                                            [float(paper["near_asked_by_far"])] * 3, [4.0] * 3)
         rows[ROWS.index("both_weighted")].update(trial_all_ms=[30.0] * 3, trial_shortest_all_ms=[9.0, 11.0, 12.0])
         found = {each["name"]: each for each in dsgd_figures.figures(rows, [], hosts, 4)}
         compared = [each for name, each in found.items() if each["paper"] is not None and name not in ("mse", "lines")]
@@ -113,11 +120,33 @@ class Table(unittest.TestCase):
 
     def test_the_smallest_shards_that_are_worth_it_are_found(self):
         self.assertEqual(dsgd_figures.together([2.0, 2.0]), 1.0)
-        sizes = [{"share": {"median": share}, "gain_resplit": {"median": gain}, "shard_ms": {"median": ms}}
-                 for ms, share, gain in ((1, 90, 0.5), (10, 5, 0.9), (100, 0.5, 1.2), (1000, 0.1, 1.4))]
-        self.assertEqual([(each["name"], each["value"]) for each in dsgd_figures.of_sizes(sizes)],
-                         [("shard_cheap", 100), ("shard_worth", 100)])
-        self.assertEqual(list(dsgd_figures.of_sizes(sizes[:2])), [])
+        def sizes(*rows):
+            return [{"share": {"median": high / 2, "high": high}, "gain_resplit": {"median": 2 * low, "low": low},
+                     "shard_ms": {"median": ms}, "work_ms": {"median": 2 * ms}} for ms, high, low in rows]
+
+        def found(*rows):
+            return [(each["name"], each["value"]) for each in dsgd_figures.of_sizes(sizes(*rows))]
+
+        falling = ((1, 90, 0.5), (10, 5, 0.9), (100, 0.5, 1.2), (1000, 0.1, 1.4))
+        self.assertEqual(found(*falling), [("shard_cheap", 100), ("work_worth", 200)])
+        self.assertEqual(found(*falling[:2]), [])
+        # A small size that met the mark by chance does not count.
+        self.assertEqual(found((0.5, 0.9, 1.1), *falling), [("shard_cheap", 100), ("work_worth", 200)])
+        self.assertEqual(found(*falling, (3000, 1.1, 0.99)), [])
+
+    def test_a_worse_classifier_of_the_curve_shows(self):
+        def report(mse):
+            return {"times": {"elapsed_ms": 2.0, "longest_ms": 1.0, "overhead_ms": 1.0},
+                    "quality": {"mse": mse, "least_mse": 0.02}}
+
+        good, bad = ({name: [report(0.0201), report(mse)] for name in dsgd.OF_SIZES} for mse in (0.02, 0.03))
+        curve = [dsgd.size_result(1, good), dsgd.size_result(2, {**good, "both_resplit": bad["both_resplit"]})]
+        self.assertAlmostEqual(curve[0]["mse_ratio"], 1.005)
+        self.assertAlmostEqual(curve[1]["mse_ratio"], 1.5)
+        rows = [{"mse": [0.02, 0.0202], "least_mse": 0.02}]
+        ratio = {each["name"]: each for each in dsgd_figures.results(rows, curve)}["mse_ratio"]
+        self.assertAlmostEqual(ratio["value"], 1.5)
+        self.assertFalse(ratio["reached"])
 
     def test_a_classifiers_error_is_found_again(self):
         points = dsgd_points.made()

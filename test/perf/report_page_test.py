@@ -243,6 +243,7 @@ class Pictures(unittest.TestCase):
         self.assertNotIn("150 ms", shown["picture-dsgd"])
         self.assertIn("of it the trial", shown["picture-dsgd_cost"])
         self.assertIn("time of a shard, ms", shown["picture-dsgd_sizes"])
+        self.assertIn("the work: time of all threads of the first host, ms", shown["picture-dsgd_sizes"])
         self.assertIn("by hand, multicast", shown["picture-fan_out"])
         self.assertIn("a quick run", shown["picture-bytes"])
 
