@@ -259,16 +259,17 @@ class Manager(unittest.TestCase):
         self.assertEqual(report["result"], trained_here(LONG))
 
     def test_where_nobody_is_left_each_fate_is_told(self):
-        with node("sat1") as daemon:
-            manager = start("--at", daemon.url, "--nodes", "sat1", "-e", ENDLESS, "--json")
-            wait_until_running(daemon, 2)
-            kill(daemon)
-            code, out, err = finish(manager)
-        self.assertEqual(code, 5, err)
-        report = json.loads(out)
-        self.assertEqual(sorted(self.fates(report)), ["failed", "withdrawn", "withdrawn", "withdrawn"])
-        self.assertRegex(report["error"], r"^shard \d: sat1: unavailable: ")
-        self.assertIn(report["error"], err)
+        for more in ([], ["--resplit"]):
+            with node("sat1") as daemon:
+                manager = start("--at", daemon.url, "--nodes", "sat1", "-e", ENDLESS, "--json", *more)
+                wait_until_running(daemon, 2)
+                kill(daemon)
+                code, out, err = finish(manager)
+            self.assertEqual(code, 5, err)
+            report = json.loads(out)
+            self.assertEqual(sorted(self.fates(report)), ["failed", "withdrawn", "withdrawn", "withdrawn"])
+            self.assertRegex(report["error"], r"^shard \d: sat1: unavailable: ")
+            self.assertIn(report["error"], err)
 
     def test_daemons_go_on_without_a_killed_manager(self):
         with Cluster() as cluster:
@@ -321,6 +322,11 @@ class Manager(unittest.TestCase):
                     report, _ = self.check(["--at", first.url, "--nodes", name, "-e", "5"])
                     self.assertEqual({part["node"] for part in report["parts"]}, {name})
                     self.assertEqual(self.fates(report), ["done"] * 4)
+                # Two of the four shards are refused; the minimal manager reports the first.
+                done = subprocess.run([MINIMAL, first.url, "4", "20", "sat1", "sat2"], capture_output=True, text=True,
+                                      check=False, env=clean_environment(), timeout=PATIENCE)
+                self.assertEqual((done.returncode, done.stdout), (1, ""))
+                self.assertRegex(done.stderr, "^cles-dsgd-minimal: bad_request: .*this node has other data")
 
     def test_more_shards_than_points(self):
         with node("sat1", plugin=f"plugins: [{{path: {PLUGIN}, config: {{per_class: 1}}}}]\n") as daemon:
