@@ -134,7 +134,7 @@ BOOST_AUTO_TEST_CASE(the_deviation_of_a_velocity_is_that_of_many_noisy_tracks) {
         all.step(seen, frame);
         if (i > 100) {
             BOOST_TEST_REQUIRE(all.confirmed().size() == 1U);
-            const auto& velocity = all.confirmed().front().velocity;
+            const auto velocity = all.confirmed().front().velocity;
             squares += std::pow(velocity.x - 1 / frame, 2) + std::pow(velocity.y, 2);
             count += 2;
         }
