@@ -34,6 +34,11 @@ void assessment::sample(const std::vector<motion>& where) {
 void assessment::sample(const std::vector<motion>& where, const std::vector<double>& desired) {
     const bool complete = where.size() == result_.error.size() + 1;
     result_.string_ratio = complete ? 0 : result_.string_ratio;
+    for (std::size_t i = 0; complete && i < where.size(); ++i) {
+        auto& most = i == 0 ? of_leader_ : of_others_;
+        most = std::max(most, std::abs(where[i].a));
+    }
+    result_.acceleration_ratio = of_leader_ > 0 ? of_others_ / of_leader_ : 0;
     for (std::size_t i = 0; i + 1 < where.size(); ++i) {
         const double distance = where[i].x - where[i + 1].x;
         result_.least_gap = std::fmin(result_.least_gap, distance - length_);
@@ -45,6 +50,9 @@ void assessment::sample(const std::vector<motion>& where, const std::vector<doub
         if (i > 0 && result_.error[i - 1] > 0) {
             result_.string_ratio = std::max(result_.string_ratio, most / result_.error[i - 1]);
         }
+    }
+    if (complete && !result_.error.empty() && result_.error.front() > 0) {
+        result_.first_ratio = *std::max_element(result_.error.begin(), result_.error.end()) / result_.error.front();
     }
     result_.collision = result_.least_gap <= 0;
 }

@@ -18,10 +18,14 @@ inline constexpr double stable_ratio = 1.02;
 struct verdict {
     std::vector<double> error{}; ///< m
     double string_ratio = 0;     ///< the largest of error[i+1]/error[i]: at most 1 if errors do not grow
-    double least_gap = NAN;      ///< m, from bumper to bumper; NaN (null) if no two were present at the same time
+    /// The largest error divided by error[0]: at most 1 if no error is larger than that behind the leader. Unlike the
+    /// errors of neighbours, this may be compared if vehicles differ.
+    double first_ratio = 0;
+    double acceleration_ratio = 0; ///< the largest acceleration of a follower divided by that of the leader
+    double least_gap = NAN;        ///< m, from bumper to bumper; NaN (null) if no two were present at the same time
     bool collision = false;
 };
-BOOST_DESCRIBE_STRUCT(verdict, (), (error, string_ratio, least_gap, collision))
+BOOST_DESCRIBE_STRUCT(verdict, (), (error, string_ratio, first_ratio, acceleration_ratio, least_gap, collision))
 
 /// Evaluates the positions of all vehicles at the same times.
 class assessment {
@@ -38,6 +42,7 @@ class assessment {
   private:
     double spacing_, length_;
     verdict result_;
+    double of_leader_ = 0, of_others_ = 0; ///< the largest accelerations, m/s²
 };
 
 /// The smallest gap between two successive vehicles, from bumper to bumper; NaN if there are not two.

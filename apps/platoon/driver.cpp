@@ -19,6 +19,11 @@ constexpr double distance_tolerance = 2; // m
 constexpr double cruise_gain = 0.5;      // 1/s
 constexpr double cruise_limit = 1;       // m/s²
 
+// While updates of the one ahead are missing, and others tell what it does.
+constexpr double missed_after = 1.75;  // periods
+constexpr double refuting_error = 0.3; // m, from what the radar sees
+constexpr double refuting_speed = 0.5; // m/s
+
 // With the radar alone.
 constexpr double radar_share_time = 0.8; // s, in which its estimate replaces the extrapolated update
 constexpr double hold_time = 3;          // s, after which the gap opens, and this vehicle leads those behind
@@ -42,8 +47,7 @@ reference blend(const reference& from, const reference& to, double share) {
                       .v = between(from.where.v, to.where.v),
                       .a = between(from.where.a, to.where.a)},
             .command = between(from.command, to.command),
-            .distance = to.distance,
-            .lag_ratio = from.lag_ratio};
+            .distance = to.distance};
 }
 
 } // namespace
@@ -60,15 +64,15 @@ driver::driver(driver_setup setup, double now)
 }
 
 std::set<std::string> driver::needed() const {
-    std::set<std::string> names{ahead_, next_, lead_, admits_, makes_room_for_, setup_.before};
+    std::set<std::string> names{ahead_, next_, lead_, beyond_, admits_, makes_room_for_, setup_.before};
     std::erase_if(names, [this](const auto& name) { return !needs(name); });
     return names;
 }
 
 bool driver::needs(const std::string& name) const {
     return !name.empty() &&
-           (name == ahead_ || name == lead_ || name == next_ || name == admits_ || name == makes_room_for_ ||
-            (mode_ == role::merge && name == setup_.before)) &&
+           (name == ahead_ || name == lead_ || name == next_ || name == beyond_ || name == admits_ ||
+            name == makes_room_for_ || (mode_ == role::merge && name == setup_.before)) &&
            name != setup_.name;
 }
 
@@ -80,6 +84,11 @@ const track* driver::heard(const std::string& name) const {
 bool driver::silent(const std::string& name) const {
     const auto* who = heard(name);
     return who == nullptr ? now_ - began_ > start_timeout : who->silence(now_) > silent_after / setup_.hz;
+}
+
+bool driver::misses(const std::string& name) const {
+    const auto* who = heard(name);
+    return who == nullptr || who->silence(now_) > missed_after / setup_.hz;
 }
 
 void driver::enter(role mode, const std::string& why) {
@@ -101,6 +110,7 @@ void driver::admit(const std::string& name) {
 void driver::split() {
     ahead_.clear();
     next_.clear();
+    beyond_.clear();
     makes_room_for_.clear();
     cruise_ = self_.v;
     lead_those_behind();
@@ -108,7 +118,10 @@ void driver::split() {
 }
 
 void driver::measure(const echo& seen, double now) {
-    radar_.measure(seen, advance(self_, command_, setup_.limits.lag, now - now_), now);
+    if (heard(ahead_) == nullptr && mode_ == role::follow) {
+        distance_ = seen.range + setup_.limits.length; // it does not know yet which one is desired
+    }
+    radar_.measure(seen, advance(self_, applied_, setup_.limits.lag, now - now_), now);
 }
 
 void driver::receive(const std::string& from, const state& heard_now, double now) {
@@ -132,9 +145,11 @@ void driver::receive(const std::string& from, const state& heard_now, double now
         return;
     }
     if (anew) {
-        const double measured = who.at(now).x - advance(self_, command_, setup_.limits.lag, now - now_).x;
+        const double measured = who.at(now).x - advance(self_, applied_, setup_.limits.lag, now - now_).x;
         distance_ = std::abs(measured - wanted()) < distance_tolerance ? wanted() : measured;
     }
+    refuted_ = false;
+    beyond_ = who.last().lead == ahead_ ? "" : who.last().ahead;
     makes_room_for_ = mode_ == role::merge || who.last().admits == setup_.name ? "" : who.last().admits;
     choose_leader(who.last());
     if (who.last().mode == role::leave) {
@@ -146,6 +161,7 @@ void driver::take_over(const state& from) {
     next_ = from.ahead;
     if (next_.empty()) { // the leader leaves, and this vehicle takes its place
         ahead_.clear();
+        beyond_.clear();
         lead_ = setup_.name;
         behind_ = 0;
         cruise_ = self_.v;
@@ -163,12 +179,13 @@ void driver::choose_leader(const state& of_ahead) {
 
 void driver::step(double now) {
     const double dt = now - now_;
-    self_ = advance(self_, command_, setup_.limits.lag, dt);
+    self_ = advance(self_, applied_, setup_.limits.lag, dt);
     now_ = now;
     const double before = command_;
     if (!admits_.empty() && now_ > admits_until_) {
         admits_.clear();
     }
+    infer_ahead();
     if (mode_ == role::lead) {
         lead(dt);
     } else if (!silent(ahead_)) {
@@ -183,6 +200,8 @@ void driver::step(double now) {
         fall_back(dt);
     }
     command_ = std::clamp(command_, -setup_.limits.brake, setup_.limits.accelerate);
+    applied_ =
+        std::clamp(compensated(command_, self_.a, setup_.limits.lag), -setup_.limits.brake, setup_.limits.accelerate);
     if (dt > 0) {
         trend_ += ((command_ - before) / dt - trend_) * std::min(1.0, dt / trend_time);
     }
@@ -219,7 +238,7 @@ void driver::follow(double dt) {
     } else {
         enter(role::follow, "receives " + ahead_ + " and " + lead_);
     }
-    fade(leader_counts, dt);
+    fade(leader_counts || (setup_.uses_leader && !broken && reports_leader(ahead_)), dt);
     command_ = law(reference_to(ahead_, distance_));
 }
 
@@ -234,12 +253,54 @@ reference driver::reference_to(const std::string& name, double distance) const {
     if (who == nullptr) {
         return {};
     }
-    return {who->at(now_), who->command_at(now_), distance, setup_.limits.lag / who->last().lag};
+    return {who->at(now_), who->command_at(now_), distance};
 }
 
-double driver::law(const reference& ahead) const {
-    const bool leads = !setup_.uses_leader || heard(lead_) == nullptr;
-    return spacing_law(setup_.law, self_, ahead, reference_to(lead_, behind_), leads ? 0 : weight_);
+bool driver::reports_leader(const std::string& name) const {
+    const auto* who = heard(name);
+    return who != nullptr && !silent(name) && who->last().lead == lead_ && who->last().mode == role::follow;
+}
+
+std::optional<double> driver::from_leader(const motion& of, double behind, const std::string& name_ahead,
+                                          const reference& ahead) const {
+    const auto* leader = heard(lead_);
+    if (misses(lead_) && reports_leader(name_ahead)) {
+        const auto* who = heard(name_ahead);
+        if (leader == nullptr || who->silence(now_) < leader->silence(now_)) {
+            const double trend = setup_.law.q3 * who->last().j;
+            return leader_part(setup_.law, of, ahead, who->last().from_leader + trend * who->silence(now_));
+        }
+    }
+    return leader == nullptr ? std::nullopt : std::optional{leader_part(setup_.law, of, reference_to(lead_, behind))};
+}
+
+double driver::law(const reference& ahead) {
+    const auto part = setup_.uses_leader ? from_leader(self_, behind_, ahead_, ahead) : std::nullopt;
+    from_leader_ = part.value_or(0);
+    return spacing_law(setup_.law, self_, ahead, from_leader_, part ? weight_ : 0);
+}
+
+// It obeys the same law, so that its command follows from what is ahead of it.
+void driver::infer_ahead() {
+    const auto* ahead = heard(ahead_);
+    const auto* beyond = heard(beyond_);
+    if (ahead == nullptr || beyond == nullptr || !misses(ahead_) || silent(beyond_) ||
+        ahead->last().mode != role::follow || beyond->last().mode == role::fallback || !setup_.uses_leader) {
+        return;
+    }
+    const auto where = ahead->at(now_);
+    if (radar_.sees(now_)) {
+        const auto seen = radar_.at(now_);
+        refuted_ = refuted_ || std::abs(seen.x + setup_.limits.length - where.x) > refuting_error ||
+                   std::abs(seen.v - where.v) > refuting_speed;
+    }
+    const auto what = reference_to(beyond_, ahead->last().behind - beyond->last().behind);
+    const auto part = from_leader(where, ahead->last().behind, beyond_, what);
+    if (part && !refuted_) {
+        const double command = spacing_law(setup_.law, where, what, *part, 1);
+        tracks_[ahead_].assume(std::clamp(command, -ahead->last().brake, setup_.limits.accelerate), now_);
+        inferred_ = now_;
+    }
 }
 
 double driver::wanted() const {
@@ -287,7 +348,8 @@ void driver::follow_by_radar(double dt) {
     seen.x += setup_.limits.length;
     reference ahead{.where = seen, .command = seen.a, .distance = distance_};
     if (heard(ahead_) != nullptr) {
-        ahead = blend(reference_to(ahead_, distance_), ahead, std::min(1.0, since / radar_share_time));
+        ahead = blend(reference_to(ahead_, distance_), ahead,
+                      std::min(1.0, (now_ - std::max(radar_since_, inferred_)) / radar_share_time));
     }
     command_ = law(ahead);
     if (since > hold_time) {
@@ -353,7 +415,7 @@ state driver::report() const {
             .a = self_.a,
             .u = command_,
             .j = trend_,
-            .lag = setup_.limits.lag,
+            .from_leader = from_leader_,
             .brake = setup_.limits.brake};
 }
 

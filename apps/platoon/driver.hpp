@@ -60,7 +60,8 @@ class driver {
     /// Its update, as of the last step.
     [[nodiscard]] state report() const;
     [[nodiscard]] const motion& position() const noexcept { return self_; }
-    [[nodiscard]] double command() const noexcept { return command_; }
+    /// To its actuators.
+    [[nodiscard]] double command() const noexcept { return applied_; }
     [[nodiscard]] role mode() const noexcept { return mode_; }
     [[nodiscard]] double now() const noexcept { return now_; }
     [[nodiscard]] const vehicle_limits& limits() const noexcept { return setup_.limits; }
@@ -81,8 +82,13 @@ class driver {
     void fall_back(double dt);
     void fade(bool leader_counts, double dt);
     void lead_those_behind();
-    [[nodiscard]] double law(const reference& ahead) const;
+    void infer_ahead();
+    [[nodiscard]] double law(const reference& ahead);
     [[nodiscard]] reference reference_to(const std::string& name, double distance) const;
+    /// What the leader adds to the command of a vehicle. \param ahead what is ahead of it
+    [[nodiscard]] std::optional<double> from_leader(const motion& of, double behind, const std::string& name_ahead,
+                                                    const reference& ahead) const;
+    [[nodiscard]] bool reports_leader(const std::string& name) const;
     [[nodiscard]] double keep_time_gap(double dt);
     [[nodiscard]] bool has_room() const;
     [[nodiscard]] double wanted() const;
@@ -90,15 +96,18 @@ class driver {
     void take_over(const state& from);
     void choose_leader(const state& of_ahead);
     [[nodiscard]] bool silent(const std::string& name) const;
+    [[nodiscard]] bool misses(const std::string& name) const;
     [[nodiscard]] const track* heard(const std::string& name) const;
 
     driver_setup setup_;
     motion self_;
     double command_ = 0, trend_ = 0;
+    double applied_ = 0; ///< what the actuators are commanded
     double now_, began_;
     role mode_ = role::follow;
     bool leaving_ = false;
     std::string ahead_, next_, lead_; ///< `next_`: the one ahead after the present one has left
+    std::string beyond_;              ///< the one ahead of the one ahead
     std::string admits_;              ///< the vehicle that merges behind this one ...
     double admits_until_ = 0;         ///< ... and when it is given up, or is in the lane
     std::string makes_room_for_;      ///< the vehicle that merges ahead of this one
@@ -106,6 +115,9 @@ class driver {
     double behind_ = 0;               ///< desired distance to the leader
     double weight_ = 0;               ///< of the leader
     double doubt_ = 0;                ///< s, for which it has not counted
+    double from_leader_ = 0;          ///< what it adds to the command
+    double inferred_ = -1e9;          ///< when the one ahead was inferred from others last
+    bool refuted_ = false;            ///< by the radar, since its last update
     double fallback_since_ = 0;
     double radar_since_ = 0, radar_until_ = -1e9;
     std::optional<double> time_gap_; ///< s, that it keeps by radar at present

@@ -35,6 +35,7 @@ localization to_localization(const state& of, double start_utc) {
             .a = of.a,
             .u = of.u,
             .j = of.j,
+            .from_leader = of.from_leader,
             .lag = of.lag,
             .brake = of.brake,
             .sent_ns = of.sent_ns};
@@ -52,6 +53,7 @@ state to_state(const localization& heard, double start_utc) {
             .a = heard.a,
             .u = heard.u,
             .j = heard.j,
+            .from_leader = heard.from_leader,
             .lag = heard.lag,
             .brake = heard.brake,
             .sent_ns = heard.sent_ns};

@@ -21,11 +21,12 @@ struct localization {
     double lat = 0, lon = 0; ///< degrees, of its front
     double v = 0, a = 0;     ///< m/s, m/s²
     double u = 0, j = 0;     ///< m/s², m/s³
+    double from_leader = 0;  ///< m/s²
     double lag = 0, brake = 0;
     std::int64_t sent_ns = 0;
 };
 BOOST_DESCRIBE_STRUCT(localization, (),
-                      (mode, ahead, lead, admits, behind, utc, lat, lon, v, a, u, j, lag, brake, sent_ns))
+                      (mode, ahead, lead, admits, behind, utc, lat, lon, v, a, u, j, from_leader, lag, brake, sent_ns))
 
 /// The road: a straight line on the plane, which all vehicles know as their map.
 geo::geographic place_on_road(double x);

@@ -18,6 +18,10 @@ motion integrate(const motion& from, double command, double lag, double dt) {
 
 } // namespace
 
+double compensated(double command, double acceleration, double lag) {
+    return command + (lag / platoon_lag - 1) * (command - acceleration);
+}
+
 motion advance(const motion& from, double command, double lag, double dt) {
     const auto to = integrate(from, command, lag, dt);
     if (to.v > 0 || dt <= 0) {

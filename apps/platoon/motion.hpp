@@ -16,6 +16,13 @@ struct vehicle_limits {
     double accelerate = 2.5; ///< m/s²
 };
 
+/// The lag of the platoon: all vehicles respond with it to what their controllers command, whatever their own lag is.
+inline constexpr double platoon_lag = vehicle_limits{}.lag;
+
+/// What an actuator with this lag has to be commanded so that the acceleration follows `command` with the lag of the
+/// platoon.
+double compensated(double command, double acceleration, double lag);
+
 /// Its motion `dt` later with a constant command; exact for any `dt`. It does not roll backwards.
 motion advance(const motion& from, double command, double lag, double dt);
 

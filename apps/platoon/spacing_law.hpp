@@ -10,9 +10,6 @@ struct reference {
     motion where{};
     double command = 0;
     double distance = 0;
-    /// The own lag divided by its lag. If this vehicle is slower to react, it has to feed forward more of the
-    /// difference between command and acceleration to accelerate at the same time.
-    double lag_ratio = 1;
 };
 
 /// Swaroop and Hedrick's law for constant spacing (1999): sliding control of
@@ -32,8 +29,12 @@ gains gains_for(double hz);
 /// in which the two come to a halt from this speed, so that no collision follows if both brake as hard as they can.
 double wanted_distance(double spacing, double speed, double own_brake, double brake_ahead);
 
+/// What the leader adds to the numerator of the law, m/s².
+double leader_part(const gains& law, const motion& self, const reference& leader);
+/// The same without the leader, from what it adds for the vehicle ahead: both have the same leader.
+double leader_part(const gains& law, const motion& self, const reference& ahead, double part_of_ahead);
+
 /// The acceleration to command. \param weight of the leader: 1: full; 0: only the one ahead counts
-double spacing_law(const gains& law, const motion& self, const reference& ahead, const reference& leader,
-                   double weight);
+double spacing_law(const gains& law, const motion& self, const reference& ahead, double from_leader, double weight);
 
 } // namespace platoon

@@ -32,7 +32,8 @@ struct state {
     double behind = 0;    ///< its desired distance to the leader, m, front to front
     double t = 0;         ///< s, by the sender's clock: only differences are meaningful to others
     double x = 0, v = 0, a = 0;
-    double u = 0, j = 0; ///< the commanded acceleration from now on, m/s², and how it changes, m/s³
+    double u = 0, j = 0;    ///< the commanded acceleration from now on, m/s², and how it changes, m/s³
+    double from_leader = 0; ///< what the leader adds to it, m/s²; others may not receive the leader
     double lag = vehicle_limits{}.lag, brake = vehicle_limits{}.brake; ///< its own, s and m/s²
     std::int64_t sent_ns = 0; ///< CLOCK_MONOTONIC, for measuring on one machine; not used to drive
 

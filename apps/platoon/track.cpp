@@ -20,19 +20,29 @@ void track::receive(const state& heard, double now) {
     // The clocks are not synchronised, but the difference shows how much longer an update took than the fastest one.
     const double difference = now - heard.t;
     offset_ = !last_ || restarted ? difference : std::min(difference, offset_ + drift * (now - received_));
-    last_ = heard;
+    last_ = base_ = heard;
     received_ = now;
 }
 
-double track::age(double now) const { return std::clamp(now - offset_ - last_->t, 0.0, horizon); }
+void track::assume(double command, double now) {
+    const auto there = at(now);
+    base_.t = now - offset_;
+    base_.x = there.x;
+    base_.v = there.v;
+    base_.a = there.a;
+    base_.u = command;
+    base_.j = 0;
+}
 
-double track::command_at(double now) const { return last_->u + last_->j * std::min(age(now), trend_horizon); }
+double track::age(double now) const { return std::clamp(now - offset_ - base_.t, 0.0, horizon); }
+
+double track::command_at(double now) const { return base_.u + base_.j * std::min(age(now), trend_horizon); }
 
 motion track::at(double now) const {
     const double command = command_at(now);
     const double ramp = std::min(age(now), trend_horizon);
-    const auto then = advance(last_->position(), (last_->u + command) / 2, last_->lag, ramp);
-    return advance(then, command, last_->lag, age(now) - ramp);
+    const auto then = advance(base_.position(), (base_.u + command) / 2, base_.lag, ramp);
+    return advance(then, command, base_.lag, age(now) - ramp);
 }
 
 } // namespace platoon

@@ -17,6 +17,8 @@ class track {
     [[nodiscard]] const state& last() const noexcept { return *last_; }
     /// How long it has been silent, by local time alone.
     [[nodiscard]] double silence(double now) const noexcept { return now - received_; }
+    /// Without an update, it is known from others that it commands this acceleration now.
+    void assume(double command, double now);
     /// The acceleration that it commands now, by extrapolation.
     [[nodiscard]] double command_at(double now) const;
     /// Its motion now, by extrapolation.
@@ -26,6 +28,7 @@ class track {
     [[nodiscard]] double age(double now) const;
 
     std::optional<state> last_;
+    state base_{};        ///< from which its motion is extrapolated: the last update, or what has been assumed since
     double received_ = 0; ///< when the last update arrived
     double offset_ = 0;   ///< local time minus the sender's, for the fastest update
 };

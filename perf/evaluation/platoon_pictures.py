@@ -23,6 +23,8 @@ SERIES = (("10 % lost", ("--loss", 10), "#1f5fa8"),
           ("10 % in bursts of 3", ("--loss", 10, "--burst", 3), "#c03030"),
           ("10 %, no radar", ("--loss", 10, "--no-radar"), "#77aadd"),
           ("bursts, no radar", ("--loss", 10, "--burst", 3, "--no-radar"), "#e09090"))
+MIXED = {"lags": ("--lags", 0.2, 0.5), "lags, brakes of 7 to 8": ("--lags", 0.2, 0.5, "--brakes", 7, 8),
+         "lags, brakes of 5.5 to 8": ("--lags", 0.2, 0.5, "--brakes", 5.5, 8)}
 BURSTS = (1.2, 2, 3, 5, 8)
 
 
@@ -75,6 +77,20 @@ def bursts_chart(found):
         chart.curve([row["burst"] for row in found[str(hz)]], [100 * row["failure_rate"] for row in found[str(hz)]],
                     colours[hz])
     return legend_inside(chart, [(f"{hz} Hz", colours[hz]) for hz in RATES])
+
+
+def mixed_chart(found):
+    """The failure rate of the largest error over that behind the leader."""
+    rows = [row for series in found.values() for row in series.values()]
+    chart = Chart(f"Drives with an error larger than that behind the leader, of {rows[0]['seeds']} each, 10 % lost",
+                  "updates per second of each vehicle", "% of drives", (5, 55),
+                  (0, max(2.0, *(100 * row["first_high"] for row in rows)) * 1.05), x_ticks=RATES)
+    colours = {name: colour_of(i, len(found)) for i, name in enumerate(found)}
+    for index, (name, series) in enumerate(found.items()):
+        for row in series.values():
+            chart.point(row["hz"] + (index - 1) * 1.1, 100 * row["first_rate"], colours[name], 100 * row["first_low"],
+                        100 * row["first_high"])
+    return legend_inside(chart, list(colours.items()))
 
 
 def legend_inside(chart, entries):
@@ -130,6 +146,8 @@ def drawn(program, seeds):
     failures = {name: [counted(program, seeds, "--hz", hz, *options) for hz in RATES] for name, options, _ in SERIES}
     bursts = {str(hz): [counted(program, max(1, seeds // 5), "--hz", hz, "--loss", 10, "--burst", length) for length in BURSTS]
               for hz in RATES}
+    mixed = {name: {str(hz): counted(program, seeds, "--hz", hz, "--loss", 10, *options) for hz in RATES}
+             for name, options in MIXED.items()}
     mute = recorded(program, "--vehicles", 6, "--mute", "2@10+30", "--brake-at", 100, "--seconds", 80)
     differ = recorded(program, "--vehicles", 8, "--loss", 10, "--lags", 0.2, 0.5, "--brakes", 5.5, 8)
     merge = recorded(program, "--vehicles", 5, "--loss", 10, "--merge", "2@5", "--brake-at", 30, "--seconds", 60)
@@ -142,11 +160,12 @@ def drawn(program, seeds):
                                      "m to the vehicle ahead", marks=((10, "v2 falls silent"), (40, "v2 sends again"))),
         "differences": courses_chart(differ, "error", "Lags of 0.2 to 0.5 s and brakes of 5.5 to 8 m/s²: spacing error",
                                      "m", least=0.1),
+        "mixed": mixed_chart(mixed),
         "merge": courses_chart(merge, behind_leader(merge), "v5 merges between v2 and v3, and later the leader brakes",
                                "m behind the leader", marks=((5, "v5 asks"), (30, "v0 brakes"))),
         "split": courses_chart(split, behind_leader(split), "v3 splits off with those behind it, and later the leader brakes",
                                "m behind the leader", marks=((5, "v3 splits off"), (30, "v0 brakes")))}
-    return pictures, {"failures": failures, "bursts": bursts}
+    return pictures, {"failures": failures, "bursts": bursts, "mixed": mixed}
 
 
 def main():

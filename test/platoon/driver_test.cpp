@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
+#include <string>
 
 namespace driver {
 namespace {
@@ -80,6 +83,49 @@ BOOST_AUTO_TEST_CASE(in_its_place_it_does_nothing) {
     BOOST_TEST((all.v2.mode() == role::follow));
     BOOST_TEST(std::abs(all.v2.command()) < 1e-6);
     BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.position().x - 15) < 1e-6);
+}
+
+/// The command of v3 after `seconds` in which the vehicles in `silent` are not received, and all ahead of it brake.
+double command_of_v3(const std::set<std::string>& silent, double from_leader, double seconds) {
+    platoon::driver v3{{.name = "v3", .ahead = "v2", .start = {.x = -45, .v = 25, .a = 0}}, 0};
+    std::map<std::string, platoon::state> others{
+        {"v0", {.mode = role::lead, .lead = "v0", .v = 25}},
+        {"v1", {.mode = role::follow, .ahead = "v0", .lead = "v0", .behind = 15, .x = -15, .v = 25}},
+        {"v2", {.mode = role::follow, .ahead = "v1", .lead = "v0", .behind = 30, .x = -30, .v = 25}}};
+    for (double now = 0; now < 1 + seconds; now += period) {
+        for (auto& [name, each] : others) {
+            each.t = now;
+            each.u = now < 1 ? 0 : -5;
+            each.from_leader = now < 1 ? 0 : from_leader;
+            if (now < 1 || !silent.contains(name)) {
+                v3.receive(name, each, now);
+            }
+            const auto next = advance(each.position(), each.u, 0.3, period);
+            each.x = next.x;
+            each.v = next.v;
+            each.a = next.a;
+        }
+        v3.step(now);
+    }
+    BOOST_TEST((v3.needed() == std::set<std::string>{"v0", "v1", "v2"}));
+    return v3.command();
+}
+
+BOOST_AUTO_TEST_CASE(others_tell_what_one_does_whose_updates_are_missing) {
+    const double all = command_of_v3({}, 0, 3.5 * period);
+    const double one = command_of_v3({"v2"}, 0, 3.5 * period);
+    const double two = command_of_v3({"v1", "v2"}, 0, 3.5 * period);
+    BOOST_TEST(all < -0.5);
+    BOOST_TEST(one < two - 0.01);
+    BOOST_TEST(all < two - 0.01);
+}
+
+BOOST_AUTO_TEST_CASE(the_one_ahead_tells_what_the_leader_adds) {
+    const double with = command_of_v3({"v0"}, -3, 3.5 * period);
+    const double without = command_of_v3({"v0"}, 0, 3.5 * period);
+    BOOST_TEST(with < without - 1);
+    // If the leader is received, that does not count.
+    BOOST_TEST(command_of_v3({}, -3, 3.5 * period) == command_of_v3({}, 0, 3.5 * period));
 }
 
 BOOST_AUTO_TEST_CASE(it_falls_back_when_three_updates_of_the_one_ahead_are_missed) {

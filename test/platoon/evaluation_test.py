@@ -69,7 +69,8 @@ class Evaluation(unittest.TestCase):
             found = json.loads(figures.read_text(encoding="utf-8"))
             drawn = {path.stem.removeprefix("platoon_"): xml.etree.ElementTree.parse(path).getroot()
                      for path in Path(folder).glob("*.svg")}
-        self.assertEqual(set(drawn), {"track", "failures", "bursts", "degradation", "differences", "merge", "split"})
+        self.assertEqual(set(drawn), {"track", "failures", "bursts", "degradation", "differences", "mixed", "merge", "split"})
+        self.assertEqual(len(drawn["mixed"].findall(".//{http://www.w3.org/2000/svg}circle")), 9)
         self.assertEqual(len(found["failures"]["10 % lost"]), 3)
         lines = {name: len(root.findall(".//{http://www.w3.org/2000/svg}polyline")) for name, root in drawn.items()}
         self.assertGreaterEqual(lines["degradation"], 5)

@@ -20,6 +20,7 @@ BOOST_AUTO_TEST_CASE(utc_and_a_place_on_earth_are_enough_for_a_vehicle) {
                               .a = -0.5,
                               .u = -1,
                               .j = 0.25,
+                              .from_leader = -0.7,
                               .lag = 0.4,
                               .brake = 6,
                               .sent_ns = 7};
@@ -40,6 +41,7 @@ BOOST_AUTO_TEST_CASE(utc_and_a_place_on_earth_are_enough_for_a_vehicle) {
     BOOST_TEST(heard.a == told.a);
     BOOST_TEST(heard.u == told.u);
     BOOST_TEST(heard.j == told.j);
+    BOOST_TEST(heard.from_leader == told.from_leader);
     BOOST_TEST(heard.lag == told.lag);
     BOOST_TEST(heard.brake == told.brake);
     BOOST_TEST(heard.sent_ns == told.sent_ns);

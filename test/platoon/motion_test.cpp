@@ -91,4 +91,18 @@ BOOST_AUTO_TEST_CASE(one_who_keeps_its_speed_commands_nothing) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(with_any_lag_a_vehicle_responds_as_the_platoon_does) {
+    for (const double lag : {0.2, 0.3, 0.5}) {
+        platoon::motion own{.x = 0, .v = 25, .a = 0};
+        platoon::motion wanted = own;
+        for (int i = 0; i < 200; ++i) {
+            const double command = i < 100 ? -4 : 1;
+            own = advance(own, platoon::compensated(command, own.a, lag), lag, 0.01);
+            wanted = advance(wanted, command, platoon::platoon_lag, 0.01);
+            BOOST_TEST(std::abs(own.a - wanted.a) < 0.05, lag << " s, step " << i);
+        }
+        BOOST_TEST(std::abs(own.x - wanted.x) < 0.02, lag << " s");
+    }
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -36,6 +36,20 @@ BOOST_AUTO_TEST_CASE(a_command_that_changes_steadily_is_carried_on, *boost::unit
     BOOST_TEST(other.command_at(10) == other.command_at(0.3)); // a change is extrapolated for a short time only
 }
 
+BOOST_AUTO_TEST_CASE(what_others_tell_replaces_its_last_command, *boost::unit_test::tolerance(1e-9)) {
+    platoon::track other;
+    const platoon::motion start{.x = 0, .v = 25, .a = 0};
+    other.receive(told(0, start, -1, -5), 0);
+    const auto then = other.at(0.2);
+    other.assume(2, 0.2);
+    BOOST_TEST(other.at(0.2).x == then.x);
+    BOOST_TEST(other.command_at(0.5) == 2);
+    BOOST_TEST(other.at(0.5).v == advance(then, 2, lag, 0.3).v);
+    BOOST_TEST(other.silence(0.5) == 0.5);
+    other.receive(told(0.6, start, -4), 0.6); // an update counts more
+    BOOST_TEST(other.command_at(0.6) == -4);
+}
+
 BOOST_AUTO_TEST_CASE(silence_is_counted_by_local_time) {
     platoon::track other;
     other.receive(told(1e6, {}, 0), 5);
