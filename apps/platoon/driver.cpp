@@ -118,8 +118,9 @@ void driver::split() {
 }
 
 void driver::measure(const echo& seen, double now) {
-    if (heard(ahead_) == nullptr && mode_ == role::follow) {
-        distance_ = seen.range + setup_.limits.length; // it does not know yet which one is desired
+    const double distance = seen.range + setup_.limits.length;
+    if (heard(ahead_) == nullptr && mode_ == role::follow && std::abs(distance - distance_) > distance_tolerance) {
+        distance_ = distance; // it does not know yet which one is desired
     }
     radar_.measure(seen, advance(self_, applied_, setup_.limits.lag, now - now_), now);
 }

@@ -307,6 +307,15 @@ BOOST_AUTO_TEST_CASE(behind_stronger_brakes_it_keeps_a_larger_distance) {
     BOOST_TEST(std::abs(platoon::wanted_distance(15, 25, 5, 8) - (15 + 625.0 / 10 - 625.0 / 16)) < 1e-9);
 }
 
+BOOST_AUTO_TEST_CASE(before_the_first_update_it_keeps_the_distance_that_the_radar_sees) {
+    platoon::driver v1{{.name = "v1", .ahead = "v0", .start = {.x = 0, .v = 25, .a = 0}}, 0};
+    BOOST_TEST(v1.desired_distance() == 15);
+    v1.measure({.range = 10.2, .rate = 0}, 0); // only noise
+    BOOST_TEST(v1.desired_distance() == 15);
+    v1.measure({.range = 25, .rate = 0}, 0);
+    BOOST_TEST(v1.desired_distance() == 30);
+}
+
 BOOST_AUTO_TEST_CASE(where_nobody_is_ahead_after_all_it_brakes) {
     platoon::driver v1{{.name = "v1", .ahead = "v0", .start = {.x = 0, .v = 25, .a = 0}}, 0};
     std::string why;

@@ -198,6 +198,16 @@ BOOST_AUTO_TEST_CASE(bursts_rarely_make_errors_grow) {
     BOOST_TEST(failures <= 4); // 11, if others do not tell what one does whose updates are missing
 }
 
+BOOST_AUTO_TEST_CASE(unless_brakes_are_too_weak_no_error_is_larger_than_the_first) {
+    auto what = with(25, 0.1);
+    what.differences = {.least_lag = 0.2, .most_lag = 0.5, .least_brake = 7, .most_brake = 8};
+    for (what.seed = 1; what.seed <= 5; ++what.seed) {
+        BOOST_TEST(simulate(what).first_ratio <= platoon::stable_ratio);
+    }
+    what.differences = {.least_brake = 5.5, .most_brake = 5.5}; // the second vehicle would have to brake harder
+    BOOST_TEST(simulate(what).first_ratio > platoon::stable_ratio);
+}
+
 BOOST_AUTO_TEST_CASE(with_different_lags_errors_do_not_grow_either) {
     for (const double hz : {10.0, 25.0, 50.0}) {
         auto what = with(hz, 0.1);
