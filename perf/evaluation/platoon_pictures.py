@@ -23,8 +23,8 @@ SERIES = (("10 % lost", ("--loss", 10), "#1f5fa8"),
           ("10 % in bursts of 3", ("--loss", 10, "--burst", 3), "#c03030"),
           ("10 %, no radar", ("--loss", 10, "--no-radar"), "#77aadd"),
           ("bursts, no radar", ("--loss", 10, "--burst", 3, "--no-radar"), "#e09090"))
-MIXED = {"lags": ("--lags", 0.2, 0.5), "lags, brakes of 7 to 8": ("--lags", 0.2, 0.5, "--brakes", 7, 8),
-         "lags, brakes of 5.5 to 8": ("--lags", 0.2, 0.5, "--brakes", 5.5, 8)}
+MIXED = {"lags": ("--lags", 0.2, 0.5), "lags; brakes 7 to 8": ("--lags", 0.2, 0.5, "--brakes", 7, 8),
+         "lags; brakes 5.5 to 8": ("--lags", 0.2, 0.5, "--brakes", 5.5, 8)}
 BURSTS = (1.2, 2, 3, 5, 8)
 
 
@@ -76,7 +76,7 @@ def bursts_chart(found):
                         100 * row["failure_low"], 100 * row["failure_high"])
         chart.curve([row["burst"] for row in found[str(hz)]], [100 * row["failure_rate"] for row in found[str(hz)]],
                     colours[hz])
-    return legend_inside(chart, [(f"{hz} Hz", colours[hz]) for hz in RATES])
+    return legend_inside(chart, [(f"{hz} Hz", colours[hz]) for hz in RATES], x=90)
 
 
 def mixed_chart(found):
@@ -90,12 +90,12 @@ def mixed_chart(found):
         for row in series.values():
             chart.point(row["hz"] + (index - 1) * 1.1, 100 * row["first_rate"], colours[name], 100 * row["first_low"],
                         100 * row["first_high"])
-    return legend_inside(chart, list(colours.items()))
+    return legend_inside(chart, list(colours.items()), top=150)
 
 
-def legend_inside(chart, entries):
+def legend_inside(chart, entries, x=640, top=72):
     for i, (label, colour) in enumerate(entries):
-        x, y = 640, 72 + i * 15
+        y = top + i * 15
         chart.line(x, y - 4, x + 18, y - 4, colour, 'stroke-width="3"')
         chart.text(x + 24, y, label)
     return chart.svg()
