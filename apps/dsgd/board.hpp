@@ -29,9 +29,9 @@ struct times {
 };
 BOOST_DESCRIBE_STRUCT(times, (), (elapsed_ms, longest_ms, overhead_ms))
 
-/// The least points of a shard that is trained on for itself: 500, whose best classifier is almost that of all points,
-/// and enough for 5 steps per unit of the rate's reciprocal. A descent needs these to forget where it began, when the
-/// points have the variance 1.
+/// How many points a shard has at least if it is made while others are trained: 500, whose best classifier is almost
+/// that of all points, and so many that it takes 5 / rate steps. After these, a descent has forgotten where it began,
+/// if the points have the variance 1.
 std::uint64_t least_points(const sgd::order& like);
 
 /// Assigns shards to nodes, again when a node fails. It only decides; its caller sends and waits.
@@ -66,9 +66,9 @@ class board {
 
     /// \param part with `after_ms`
     void done(std::size_t shard, const sgd::trained& part);
-    /// Training twice does no harm: if the node is lost, the shard is divided again if shards are made while others are
-    /// trained, or else goes to the node with the fewest shards. A busy node is asked again. Otherwise it has failed,
-    /// or was withdrawn because another one has.
+    /// If the node is lost, the shard is trained elsewhere, which does no harm: with a splitter its points are divided
+    /// again, otherwise it goes to the node with the fewest shards. A busy node is asked again. Otherwise the shard has
+    /// failed, or was withdrawn because another one has.
     /// \return false in the last case; otherwise it is to be delegated again, to the present `target`, if it is open
     bool failed(std::size_t shard, const cles::error& why);
 

@@ -86,6 +86,9 @@ int run_local(const arguments& args, const sgd::order& setup) {
     const auto orders = orders_for(sgd::divide(data.size(), std::vector<double>(args.threads, 1)), setup);
     dsgd::board all{orders, {"here"}};
     for (std::size_t i = 0; const auto& part : dsgd::train_here(data, orders)) {
+        if (!sgd::is_finite(part.result)) {
+            throw cles::error(cles::errc::failed, sgd::diverged);
+        }
         all.done(i++, part);
     }
     return report_result(args, data, all);
@@ -125,6 +128,13 @@ int run(const arguments& args, sgd::order setup) {
                      targets.size() - shards, shards);
     }
     if (args.resplit) {
+        const auto least = dsgd::least_points(setup);
+        if (const auto with_work = std::max<std::size_t>(1, data.size() / least); with_work < shards) {
+            std::fprintf(stderr,
+                         "cles-dsgd: only %zu of %zu slots have work: with these epochs and this rate, a shard has at "
+                         "least %ju points\n",
+                         with_work, shards, std::uintmax_t{least});
+        }
         dsgd::board all{data.size(), shards, setup, targets};
         pool.train(all);
         return report_result(args, data, all);
@@ -157,6 +167,12 @@ std::string wrong_url(const std::string& text) {
     }
 }
 
+std::string wrong_rate(const std::string& text) {
+    double rate = 0;
+    const bool fits = CLI::detail::lexical_cast(text, rate) && rate >= 1e-12 && rate <= 1000; // false for NaN, too
+    return fits ? "" : "a number from 1e-12 to 1000";
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
@@ -180,8 +196,8 @@ int main(int argc, char** argv) {
     auto* local =
         app.add_option("--local", args.threads, "Train here, in this number of threads")->check(CLI::Range(1, 1024));
     app.add_option("-e,--epochs", args.epochs, "Steps for each point (100)")->check(CLI::Range(1, 1'000'000));
-    app.add_option("--rate", args.rate, "Size of a step (0.0001)")->check(CLI::PositiveNumber);
-    app.add_option("--seed", args.seed, "Seed of the random numbers (1)");
+    app.add_option("--rate", args.rate, "Size of a step (0.0001)")->check(wrong_rate);
+    app.add_option("--seed", args.seed, "Seed of the random numbers (1)")->check(CLI::NonNegativeNumber);
     auto* deadline = app.add_option("--deadline", args.deadline_s, "Deadline of a shard in seconds (60)")
                          ->check(CLI::Range(1, 86'400));
     for (auto* of_nodes : {shards, at, nodes, weighted, resplit, deadline}) {

@@ -15,10 +15,20 @@ namespace dsgd {
 
 using steady = std::chrono::steady_clock;
 
+struct refusal {
+    std::string error{}, message{};
+};
+BOOST_DESCRIBE_STRUCT(refusal, (), (error, message))
+
+// The reply to PULL all:sgd: of each node its data, or why it did not answer.
 struct offers {
     std::map<std::string, sgd::recipe> results;
+    std::map<std::string, refusal> errors;
 };
-BOOST_DESCRIBE_STRUCT(offers, (), (results))
+BOOST_DESCRIBE_STRUCT(offers, (), (results, errors))
+
+// For a node that is busy as well; one that has stopped takes all of it.
+constexpr std::chrono::seconds find_deadline{5};
 
 struct pool::round {
     board& all;
@@ -56,15 +66,23 @@ pool::pool(const std::vector<std::string>& seeds, std::chrono::seconds deadline,
 }
 
 std::map<std::string, sgd::recipe> pool::find() {
+    offers found;
     try {
-        return cles::from_json<offers>(
-                   node_.request("PULL all:sgd", cles::call_options{}.deadline(std::chrono::seconds{2})))
-            .results;
+        found = cles::from_json<offers>(node_.request("PULL all:sgd", cles::call_options{}.deadline(find_deadline)));
     } catch (const cles::error& e) {
         const bool alone = e.code() == cles::errc::no_target && node_.peers().empty();
         throw cles::error(e.code(), alone ? "no node answers at the given address (--at): is clesd running there?"
                                           : e.message() + ": is libcles-sgd.so among the plugins of a node?");
     }
+    std::string silent;
+    for (const auto& [name, why] : found.errors) {
+        std::fprintf(stderr, "cles-dsgd: %s does not take part: %s\n", name.c_str(), why.message.c_str());
+        silent += (silent.empty() ? "" : ", ") + name;
+    }
+    if (found.results.empty()) {
+        throw cles::error(cles::errc::deadline, "no node that offers 'sgd' answers: " + silent);
+    }
+    return found.results;
 }
 
 void pool::train(board& all, const char* what) {

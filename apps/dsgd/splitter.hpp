@@ -12,8 +12,8 @@ namespace dsgd {
 /// Divides points while they are trained on, among slots whose speeds only show then (weighted factoring: Hummel,
 /// Schmidt, Uma and Wein, "Load-sharing in heterogeneous systems via weighted factoring", 1996). A slot trains one
 /// shard at a time. Each shard takes a part of the time that is left if all work at their last speeds, so shards become
-/// smaller, and all slots end at almost the same time. A slot that becomes slower during a shard, whichever one that
-/// is, still has to end it; the smaller that part, the less the others wait.
+/// smaller, and all slots end at almost the same time. A shard that has begun is not taken back. The smaller it is, the
+/// less the others wait if its slot becomes slower.
 class splitter {
   public:
     /// The first shard of a slot is an even share, divided by this: the speeds are not known yet.

@@ -20,7 +20,7 @@ class trial {
     static constexpr double least_trial_ms = 300;
     /// The first attempt does the work, divided by this.
     static constexpr std::uint64_t first_divisor = 20;
-    /// No attempt does more than the work, divided by this, because its result is not used.
+    /// No attempt does more than the work, divided by this (but at least one epoch), because its result is not used.
     static constexpr std::uint64_t most_divisor = 4;
 
     /// \param work    with `epochs`: what is to be done afterwards

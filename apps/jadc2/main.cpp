@@ -114,7 +114,8 @@ CLI::App* add_recon(CLI::App& app, jadc2::recon_options& args) {
         ->check(CLI::NonNegativeNumber);
     add_format(*r, args.format);
     r->add_option("--fps", args.fps, "Frames per second (25)")->check(CLI::Range(0.1, 200.0));
-    r->add_option("--frames", args.frames, "Frames after which it ends; 0: no limit (0)");
+    r->add_option("--frames", args.frames, "Frames after which it ends; 0: no limit (0)")
+        ->check(CLI::NonNegativeNumber);
     r->add_option("--deadline", args.deadline_ms, "Deadline of a frame in milliseconds (1000)")
         ->check(CLI::Range(1, 60'000));
     r->add_flag("--json", args.json, "Print a JSON object for each event");

@@ -219,7 +219,9 @@ boost::asio::awaitable<void> mission::assess(story record) {
                         " m from the " + (seen.is_target ? "target" : "nearest vehicle") + ", " +
                         fixed(what.flight_s, 2) + " s after its release; " + std::to_string(what.plots) + " plots of " +
                         what.node + " were fused with the track" +
-                        (what.plots == 0 ? ": is the seed of its sensor that of " + args_.recon_name + "?" : ""),
+                        (what.plots == 0
+                             ? ": has its sensor the seed of " + args_.recon_name + ", and does it fuse (scans)?"
+                             : ""),
                     seen);
     } catch (const cles::error& e) {
         events_.log("assessed", "order " + what.order + ": not seen: " + e.what());

@@ -27,7 +27,8 @@ constexpr std::uint64_t frames = fmv::background::learning + 40;
 constexpr std::size_t per_scene = 3;
 constexpr double least_age = 0.6;           // s
 constexpr std::uint64_t scenes_at_most = 3; // for each strike
-constexpr std::uint64_t begins = 100'000;   // of scenes, 1000 s apart: later ones repeat, so that times stay exact
+// Scenes begin 1000 s apart; further ones repeat these times, because larger ones are less exact.
+constexpr std::uint64_t distinct_times = 100'000;
 
 struct rehearsed_target {
     fmv::track track{};
@@ -135,7 +136,7 @@ rehearsal_result rehearse(const rehearsal_options& args) {
         }
         const scene ground{seed};
         double utc = 0;
-        const auto targets = film(ground, static_cast<double>(seed % begins) * 1000, utc);
+        const auto targets = film(ground, static_cast<double>(seed % distinct_times) * 1000, utc);
         for (const auto& each : targets) {
             if (fused.strikes() < args.strikes) {
                 fused.add(released(ground, seed, each, utc, args.delay_s, args.scans));

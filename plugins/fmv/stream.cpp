@@ -67,7 +67,9 @@ void stream::watch(rectified picture) {
 
 void stream::take(const grey& frame, const camera_message& from, double utc) {
     interval_ = utc - utc_.value_or(utc);
-    period_ = period_ == 0 ? interval_ : period_ + period_gain * (interval_ - period_);
+    // A pause is no lower rate: velocities after it are as inaccurate as before.
+    const double usual = period_ == 0 ? interval_ : std::min(interval_, (still_.known() ? 2 : 1) * period_);
+    period_ = period_ == 0 ? usual : period_ + period_gain * (usual - period_);
     utc_ = utc;
     if (map_) {
         if (auto picture = aligned(frame, from)) {

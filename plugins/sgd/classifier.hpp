@@ -6,6 +6,7 @@
 #include <boost/describe/class.hpp>
 
 #include <array>
+#include <cmath>
 
 namespace sgd {
 
@@ -18,6 +19,12 @@ struct classifier {
     bool operator==(const classifier&) const = default;
 };
 BOOST_DESCRIBE_STRUCT(classifier, (), (weights, bias))
+
+inline constexpr const char* diverged = "it does not converge: the rate is too large";
+/// False if a descent has left all bounds, because the rate was too large.
+inline bool is_finite(const classifier& c) noexcept {
+    return std::isfinite(c.weights[0]) && std::isfinite(c.weights[1]) && std::isfinite(c.bias);
+}
 
 /// The mean of (value - label)^2: what the paper reports, and what the descent makes small.
 double mean_squared_error(const data_set& data, const classifier& c);

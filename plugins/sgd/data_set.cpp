@@ -37,7 +37,8 @@ std::string to_string(const recipe& r) {
 
 data_set::data_set(const recipe& from) : recipe_(from) {
     if (from.per_class == 0 || from.per_class > most_per_class) {
-        throw std::invalid_argument(to_string(from) + ": 1 to " + std::to_string(most_per_class) + " are possible");
+        throw std::invalid_argument("per_class: " + std::to_string(from.per_class) + ": 1 to " +
+                                    std::to_string(most_per_class));
     }
     random_source chance{from.seed};
     // The means lie on the diagonal, as far from the origin on either side.

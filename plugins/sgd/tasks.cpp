@@ -64,8 +64,8 @@ void train(const cles::request& asked, const cles::responder& answer, const data
             heard = answer.progress(work.part_done());
         }
     }
-    if (!work.converges()) {
-        throw error(errc::failed, "it does not converge: the rate is too large");
+    if (!is_finite(work.result())) {
+        throw error(errc::failed, diverged);
     }
     const std::chrono::duration<double, std::milli> took = steady::now() - begun;
     answer.done(trained{.node = std::string{asked.node()},

@@ -2,7 +2,6 @@
 #include "training.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace sgd {
 
@@ -26,10 +25,6 @@ bool training::step() {
 
 double training::part_done() const noexcept {
     return done_ >= how_.steps ? 1 : static_cast<double>(done_) / static_cast<double>(how_.steps);
-}
-
-bool training::converges() const noexcept {
-    return std::isfinite(now_.weights[0]) && std::isfinite(now_.weights[1]) && std::isfinite(now_.bias);
 }
 
 } // namespace sgd

@@ -39,8 +39,6 @@ class training {
     /// From 0 to 1.
     [[nodiscard]] double part_done() const noexcept;
     [[nodiscard]] const classifier& result() const noexcept { return now_; }
-    /// False where it has left all bounds, since the rate was too large.
-    [[nodiscard]] bool converges() const noexcept;
 
   private:
     // Takes some 0.1 ms.

@@ -16,7 +16,7 @@ from support import PATIENCE, finish, wait_until
 DSGD = os.environ["DSGD"]
 MINIMAL = os.environ["DSGD_MINIMAL"]
 PLUGIN = os.environ["SGD_PLUGIN"]
-LONG, ENDLESS = "600", "1000000"  # epochs: some tenths of a second for a shard, and longer than any test waits
+LONG, ENDLESS = "1000", "1000000"  # epochs: half a second or more for a shard, and longer than any test waits
 
 
 def node(name, *seeds, plugin=f"plugins: [{PLUGIN}]\n"):
@@ -118,20 +118,22 @@ class Manager(unittest.TestCase):
 
     def test_a_trial_takes_long_enough_unless_the_work_does_not(self):
         with node("sat1") as daemon:
-            report, _ = self.check(["--at", daemon.url, "-n", "sat1", "-k", "1", "-e", "2000", "--weighted"])
+            report, _ = self.check(["--at", daemon.url, "-n", "sat1", "-k", "1", "-e", "800", "--weighted", "--deadline",
+                                    "600"])
             self.assertGreaterEqual(report["trial_shortest_ms"], 300)
             times = report["times"]
             self.assertGreater(times["elapsed_ms"], report["trial_ms"] + times["longest_ms"])
             self.assertGreater(times["overhead_ms"], report["trial_ms"])
-            # One epoch takes some milliseconds, so the first attempt is too short; the second is limited to five.
-            report, _ = self.check(["--at", daemon.url, "-n", "sat1", "-k", "1", "-e", "20", "--weighted"])
-            self.assertEqual(report["trial_attempts"], 2)
-            self.assertLess(report["trial_shortest_ms"], 300)
             code, out, err = run("--at", daemon.url, "-n", "sat1", "-e", "20", "--weighted")
         self.assertEqual(code, 0, err)
         self.assertRegex(err, r"(?m)^cles-dsgd: trial, [1-9]\d % of 200000 points$")
         self.assertRegex(err, r"(?m)^cles-dsgd: [1-9]\d % of 200000 points$")
         self.assertRegex(out, r"(?m)^trial +\d+\.\d{3} ms, contained in the overhead$")
+        with node("sat1", plugin=f"plugins: [{{path: {PLUGIN}, config: {{per_class: 1000}}}}]\n") as daemon:
+            # One epoch takes less than a millisecond: the first attempt is too short, the second is limited to five.
+            report, _ = self.check(["--at", daemon.url, "-n", "sat1", "-k", "1", "-e", "20", "--weighted"])
+            self.assertEqual(report["trial_attempts"], 2)
+            self.assertLess(report["trial_shortest_ms"], 300)
 
     def test_what_is_left_is_split_again(self):
         with Cluster() as cluster:
@@ -167,7 +169,7 @@ class Manager(unittest.TestCase):
             self.assertEqual((shard["fate"] == "lost"), bool(shard["trouble"]))
             self.assertEqual(part["points"], shard["what"]["count"] if shard["fate"] == "done" else 0)
             self.assertEqual(shard["target"], "sat2" if shard["fate"] == "lost" else part["node"])
-        self.assertRegex(err, r"(?m)^cles-dsgd: shard \d: sat2: unavailable: .*; its points are divided again$")
+        self.assertRegex(err, r"(?m)^cles-dsgd: shard \d+: sat2: unavailable: .*; its points are divided again$")
         self.assertEqual(report["shards"][-1]["target"], "sat1")
         self.assertLess(report["quality"]["mse"], report["quality"]["least_mse"] * 1.01)
 
@@ -297,6 +299,16 @@ class Manager(unittest.TestCase):
         self.assertEqual((code, out), (3, ""))
         self.assertEqual(err, "cles-dsgd: no node answers at the given address (--at): is clesd running there?\n")
 
+    def test_a_node_that_does_not_answer_does_not_take_part(self):
+        with Cluster() as cluster:
+            cluster.sat2.send_signal(signal.SIGSTOP)
+            try:
+                report, err = self.check(["--at", cluster.sat1.url, "-e", "5", "--resplit"])
+                self.assertEqual({part["node"] for part in report["parts"]}, {"sat1"})
+                self.assertRegex(err, "(?m)^cles-dsgd: sat2 does not take part: ")
+            finally:
+                cluster.sat2.send_signal(signal.SIGCONT)
+
     def test_no_node_has_the_plugin(self):
         with node("sat1", plugin="") as daemon:
             code, out, err = run("--at", daemon.url)
@@ -341,8 +353,12 @@ class Manager(unittest.TestCase):
             self.assertEqual((done.returncode, done.stderr),
                              (1, "cles-dsgd-minimal: 3 shards of 2 points: each takes at least one\n"))
 
+    def test_a_descent_that_diverges(self):
+        code, out, err = run("--local", "1", "--rate", "1")
+        self.assertEqual((code, out, err), (5, "", "cles-dsgd: it does not converge: the rate is too large\n"))
+
     def test_wrong_usage(self):
-        for arguments in (["--shards", "0"], ["--shards", "x"], ["--rate", "-1"], ["--nonsense"], ["--weighted", "--resplit"],
+        for arguments in (["--shards", "0"], ["--shards", "x"], ["--rate", "-1"], ["--rate", "nan"], ["--seed", "-1"], ["--nonsense"], ["--weighted", "--resplit"],
                           ["--at", "nonsense"], ["--local", "2", "--weighted"], ["--local", "2", "--resplit"],
                           ["--local", "2", "-k", "2"], ["--local", "2", "--nodes", "a"], ["--local", "2", "--deadline", "5"],
                           ["--local", "2", "--at", "tcp://127.0.0.1:1"]):

@@ -96,7 +96,7 @@ class Table(unittest.TestCase):
         self.assertEqual(found["far_less_near"]["paper"], 100)
         strict = found["overhead"]
         self.assertEqual((strict["value"], strict["paper"], strict["reached"]), (4.0, None, False))
-        self.assertFalse(found["trial_shortest"]["reached"])  # one was shorter than the period
+        self.assertFalse(found["trial_shortest"]["reached"])  # one was shorter than three periods
         self.assertTrue(found["work"]["reached"])
         self.assertIsNone(found["mse"]["target"])
         self.assertLess(found["lines"]["value"], 300)

@@ -143,6 +143,28 @@ BOOST_AUTO_TEST_CASE(after_the_camera_saw_nothing_tracks_are_where_they_were) {
     }
 }
 
+// After a pause, few frames are as rare as it would make them.
+BOOST_AUTO_TEST_CASE(after_a_pause_velocities_are_as_inaccurate_as_before) {
+    const jadc2::scene ground{3};
+    fmv::stream video{jadc2::scene::size};
+    double utc = 0;
+    const auto take = [&](std::uint64_t number) {
+        video.take(ground.frame(number, utc), ground.reported(utc), utc);
+        utc += 0.04;
+    };
+    for (std::uint64_t i = 0; i < 60; ++i) {
+        take(i);
+    }
+    BOOST_TEST_REQUIRE(!video.tracks().empty());
+    const double before = video.tracks().front().sigma_v;
+    utc += 5;
+    for (std::uint64_t i = 60; i < 75; ++i) {
+        take(i);
+    }
+    BOOST_TEST_REQUIRE(!video.tracks().empty());
+    BOOST_TEST(video.tracks().front().sigma_v > before / 2);
+}
+
 // The aircraft flies a part of its circle, so that all of the picture turns, and the wrong direction of its camera
 // too.
 BOOST_AUTO_TEST_CASE(vehicles_are_found_from_all_sides) {

@@ -102,7 +102,7 @@ class Missing(unittest.TestCase):
         self.assertIn("insecure", err)
 
     def test_wrong_usage(self):
-        for arguments in ([], ["nonsense"], ["recon", "--fps", "0"], ["mission", "--strikes", "0"], ["recon", "--seed", "x"], ["recon", "--seed", "-1"],
+        for arguments in ([], ["nonsense"], ["recon", "--fps", "0"], ["mission", "--strikes", "0"], ["recon", "--seed", "x"], ["recon", "--seed", "-1"], ["recon", "--frames", "-1"],
                           ["load", "--streams", "65"], ["mission", "--duration", "-1"], ["rehearse", "--scans", "31"],
                           ["rehearse", "--delay", "2.1"], ["rehearse", "--strikes", "0"], ["rehearse", "--seed", "-1"]):
             code, out, err = run(*arguments)
