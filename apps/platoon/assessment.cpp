@@ -5,6 +5,13 @@
 #include <cmath>
 
 namespace platoon {
+namespace {
+
+// Below these, a ratio would compare noise.
+constexpr double least_error = 0.01;       // m
+constexpr double least_acceleration = 0.1; // m/s²
+
+} // namespace
 
 std::vector<double> spacing_errors(const std::vector<motion>& where, double spacing) {
     std::vector<double> errors;
@@ -38,7 +45,7 @@ void assessment::sample(const std::vector<motion>& where, const std::vector<doub
         auto& most = i == 0 ? of_leader_ : of_others_;
         most = std::max(most, std::abs(where[i].a));
     }
-    result_.acceleration_ratio = of_leader_ > 0 ? of_others_ / of_leader_ : 0;
+    result_.acceleration_ratio = of_leader_ >= least_acceleration ? of_others_ / of_leader_ : NAN;
     for (std::size_t i = 0; i + 1 < where.size(); ++i) {
         const double distance = where[i].x - where[i + 1].x;
         result_.least_gap = std::fmin(result_.least_gap, distance - length_);
@@ -51,7 +58,7 @@ void assessment::sample(const std::vector<motion>& where, const std::vector<doub
             result_.string_ratio = std::max(result_.string_ratio, most / result_.error[i - 1]);
         }
     }
-    if (complete && !result_.error.empty() && result_.error.front() > 0) {
+    if (complete && !result_.error.empty() && result_.error.front() >= least_error) {
         result_.first_ratio = *std::max_element(result_.error.begin(), result_.error.end()) / result_.error.front();
     }
     result_.collision = result_.least_gap <= 0;

@@ -20,9 +20,11 @@ struct verdict {
     double string_ratio = 0;     ///< the largest of error[i+1]/error[i]: at most 1 if errors do not grow
     /// The largest error divided by error[0]: at most 1 if no error is larger than that behind the leader. Unlike the
     /// errors of neighbours, this may be compared if vehicles differ.
-    double first_ratio = 0;
-    double acceleration_ratio = 0; ///< the largest acceleration of a follower divided by that of the leader
-    double least_gap = NAN;        ///< m, from bumper to bumper; NaN (null) if no two were present at the same time
+    /// NaN (null) if error[0] is below 1 cm.
+    double first_ratio = NAN;
+    /// The largest acceleration of a follower divided by that of the leader; NaN (null) if that is below 0.1 m/s².
+    double acceleration_ratio = NAN;
+    double least_gap = NAN; ///< m, from bumper to bumper; NaN (null) if no two were present at the same time
     bool collision = false;
 };
 BOOST_DESCRIBE_STRUCT(verdict, (), (error, string_ratio, first_ratio, acceleration_ratio, least_gap, collision))

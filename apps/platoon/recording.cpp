@@ -71,6 +71,15 @@ std::string summary_of(const recording& drive) {
         const auto most = std::max_element(v.error.begin(), v.error.end());
         add(std::snprintf(line.data(), line.size(), "spacing   %.3f m off at most, behind v%td; string ratio %.4f\n",
                           *most, most - v.error.begin(), v.string_ratio));
+        if (!std::isnan(v.first_ratio)) {
+            add(std::snprintf(line.data(), line.size(),
+                              "first     errors of up to %.4f times the one behind the leader\n", v.first_ratio));
+        }
+        if (!std::isnan(v.acceleration_ratio)) {
+            add(std::snprintf(line.data(), line.size(),
+                              "hardest   accelerations of up to %.4f times those of the leader\n",
+                              v.acceleration_ratio));
+        }
     }
     if (std::isnan(v.least_gap)) {
         text += "gap       unknown: the drive ended before all vehicles had started\n";

@@ -25,10 +25,11 @@ struct outcome {
     double stable_ratio = 0;                                    ///< above it, a drive counts as unstable
     std::uint64_t unstable = 0;                                 ///< drives
     double failure_rate = 0, failure_low = 0, failure_high = 0; ///< of string stability, with its 95 % interval
-    double first_ratio = 0;                                     ///< the largest error over that behind the leader
-    double first_rate = 0, first_low = 0, first_high = 0;       ///< of drives in which it is above `stable_ratio`
-    double acceleration_ratio = 0;                              ///< the largest
-    std::uint64_t collisions = 0;                               ///< drives
+    double first_ratio = NAN;                                   ///< the largest error over that behind the leader
+    double above_first_rate = 0, above_first_low = 0,
+           above_first_high = 0;     ///< of drives in which it is above `stable_ratio`
+    double acceleration_ratio = NAN; ///< the largest
+    std::uint64_t collisions = 0;    ///< drives
     double collision_low = 0, collision_high = 0;
     double least_gap = INFINITY;
     bool collision = false;
@@ -38,9 +39,9 @@ struct outcome {
 };
 BOOST_DESCRIBE_STRUCT(outcome, (),
                       (vehicles, hz, loss, burst, delay_ms, controller, radar, first_seed, seeds, string_ratio,
-                       stable_ratio, unstable, failure_rate, failure_low, failure_high, first_ratio, first_rate,
-                       first_low, first_high, acceleration_ratio, collisions, collision_low, collision_high, least_gap,
-                       collision, fallbacks, radar_spells, runs))
+                       stable_ratio, unstable, failure_rate, failure_low, failure_high, first_ratio, above_first_rate,
+                       above_first_low, above_first_high, acceleration_ratio, collisions, collision_low, collision_high,
+                       least_gap, collision, fallbacks, radar_spells, runs))
 
 /// Whether errors behind a vehicle may be compared with those ahead of it: the platoon stays the same.
 bool is_steady(const scenario& what) { return what.incidents.empty(); }
@@ -91,11 +92,16 @@ void print_all(const outcome& all) {
     std::printf("failures  %ju of %ju drives above a string ratio of %g: %.2f %% (95 %% interval %.2f to %.2f %%)\n",
                 std::uintmax_t{all.unstable}, std::uintmax_t{all.seeds}, all.stable_ratio, all.failure_rate * 100,
                 all.failure_low * 100, all.failure_high * 100);
-    std::printf(
-        "first     errors of up to %.4f times the one behind the leader; above %g: %.2f %% of the drives (95 %% "
-        "interval %.2f to %.2f %%)\n",
-        all.first_ratio, all.stable_ratio, all.first_rate * 100, all.first_low * 100, all.first_high * 100);
-    std::printf("brakes    up to %.4f times as hard as the leader\n", all.acceleration_ratio);
+    if (!std::isnan(all.first_ratio)) {
+        std::printf(
+            "first     errors of up to %.4f times the one behind the leader; above %g: %.2f %% of the drives (95 %% "
+            "interval %.2f to %.2f %%)\n",
+            all.first_ratio, all.stable_ratio, all.above_first_rate * 100, all.above_first_low * 100,
+            all.above_first_high * 100);
+    }
+    if (!std::isnan(all.acceleration_ratio)) {
+        std::printf("hardest   accelerations of up to %.4f times those of the leader\n", all.acceleration_ratio);
+    }
     std::printf("collided  %ju of %ju drives (95 %% interval %.2f to %.2f %%)\n", std::uintmax_t{all.collisions},
                 std::uintmax_t{all.seeds}, all.collision_low * 100, all.collision_high * 100);
     std::printf("in each   %.2f fallbacks, %.2f spells with the radar alone, on average\n", all.fallbacks,
@@ -127,9 +133,11 @@ int simulate_command(scenario what, unsigned seeds, bool json, const std::string
         all.runs.push_back(one.verdict);
         all.string_ratio = std::max(all.string_ratio, one.verdict.string_ratio);
         all.unstable += one.verdict.string_ratio > stable_ratio ? 1 : 0;
-        all.first_ratio = std::max(all.first_ratio, one.verdict.first_ratio);
-        above_first += one.verdict.first_ratio > stable_ratio ? 1 : 0;
-        all.acceleration_ratio = std::max(all.acceleration_ratio, one.verdict.acceleration_ratio);
+        if (one.steady) {
+            all.first_ratio = std::fmax(all.first_ratio, one.verdict.first_ratio);
+            above_first += one.verdict.first_ratio > stable_ratio ? 1 : 0;
+            all.acceleration_ratio = std::fmax(all.acceleration_ratio, one.verdict.acceleration_ratio);
+        }
         all.least_gap = std::fmin(all.least_gap, one.verdict.least_gap);
         all.collisions += one.verdict.collision ? 1 : 0;
         all.fallbacks += static_cast<double>(one.fallbacks) / seeds;
@@ -150,10 +158,10 @@ int simulate_command(scenario what, unsigned seeds, bool json, const std::string
     const auto failures = wilson_interval(all.unstable, seeds);
     all.failure_low = failures.low;
     all.failure_high = failures.high;
-    all.first_rate = static_cast<double>(above_first) / seeds;
+    all.above_first_rate = static_cast<double>(above_first) / seeds;
     const auto grown = wilson_interval(above_first, seeds);
-    all.first_low = grown.low;
-    all.first_high = grown.high;
+    all.above_first_low = grown.low;
+    all.above_first_high = grown.high;
     const auto collisions = wilson_interval(all.collisions, seeds);
     all.collision_low = collisions.low;
     all.collision_high = collisions.high;
