@@ -121,7 +121,10 @@ class drive_supervisor {
         for (;;) {
             const auto item = co_await feed.async_next();
             if (item.has_value()) {
-                book_.add(item.publisher, to_state(item.value, start_utc_));
+                const auto told = to_state(item.value, start_utc_);
+                if (implausible(told, options_.setup.law).empty()) {
+                    book_.add(item.publisher, told);
+                }
                 foreign_vehicle_ = children_.contains(item.publisher) ? foreign_vehicle_ : item.publisher;
             }
         }

@@ -20,6 +20,7 @@ constexpr double cruise_gain = 0.5;      // 1/s
 constexpr double cruise_limit = 1;       // m/s²
 
 // While updates of the one ahead are missing, and others tell what it does.
+// More than one period, because an update may be late, but so that after two there is an answer before the third.
 constexpr double missed_after = 1.75;  // periods
 constexpr double refuting_error = 0.3; // m, from what the radar sees
 constexpr double refuting_speed = 0.5; // m/s
@@ -120,13 +121,13 @@ void driver::split() {
 void driver::measure(const echo& seen, double now) {
     const double distance = seen.range + setup_.limits.length;
     if (heard(ahead_) == nullptr && mode_ == role::follow && std::abs(distance - distance_) > distance_tolerance) {
-        distance_ = distance; // it does not know yet which one is desired
+        distance_ = std::max(distance, setup_.spacing); // it does not know yet which one is desired
     }
     radar_.measure(seen, advance(self_, applied_, setup_.limits.lag, now - now_), now);
 }
 
 void driver::receive(const std::string& from, const state& heard_now, double now) {
-    if (!needs(from)) {
+    if (!needs(from) || drops(from, heard_now, now)) {
         return;
     }
     bool anew = !tracks_.contains(from) || lead_ == setup_.name;
@@ -153,9 +154,19 @@ void driver::receive(const std::string& from, const state& heard_now, double now
     beyond_ = who.last().lead == ahead_ ? "" : who.last().ahead;
     makes_room_for_ = mode_ == role::merge || who.last().admits == setup_.name ? "" : who.last().admits;
     choose_leader(who.last());
+    const auto* beyond = heard(beyond_);
+    to_beyond_ = beyond == nullptr ? std::nullopt : std::optional{who.last().behind - beyond->last().behind};
     if (who.last().mode == role::leave) {
         take_over(who.last());
     }
+}
+
+bool driver::drops(const std::string& from, const state& told, double now) {
+    const auto why = implausible(told, setup_.law);
+    if (!why.empty() && dropped_.insert(from + ": " + why).second && on_drop) {
+        on_drop(now, from, why);
+    }
+    return !why.empty();
 }
 
 void driver::take_over(const state& from) {
@@ -187,6 +198,7 @@ void driver::step(double now) {
         admits_.clear();
     }
     infer_ahead();
+    from_leader_.reset();
     if (mode_ == role::lead) {
         lead(dt);
     } else if (!silent(ahead_)) {
@@ -227,7 +239,6 @@ void driver::follow(double dt) {
     const auto mode_ahead = heard(ahead_)->last().mode;
     const bool broken = mode_ahead == role::fallback && lead_ != ahead_;
     const bool leader_silent = lead_ != ahead_ && silent(lead_);
-    const bool leader_counts = setup_.uses_leader && !leader_silent && !broken && heard(lead_) != nullptr;
     if (mode_ == role::merge) {
         if (has_room()) {
             enter(role::follow, "it changes into the lane behind " + ahead_);
@@ -239,7 +250,8 @@ void driver::follow(double dt) {
     } else {
         enter(role::follow, "receives " + ahead_ + " and " + lead_);
     }
-    fade(leader_counts || (setup_.uses_leader && !broken && reports_leader(ahead_)), dt);
+    const bool leader_known = !leader_silent && heard(lead_) != nullptr;
+    fade(setup_.uses_leader && !broken && (leader_known || reports_leader(ahead_)), dt);
     command_ = law(reference_to(ahead_, distance_));
 }
 
@@ -259,34 +271,42 @@ reference driver::reference_to(const std::string& name, double distance) const {
 
 bool driver::reports_leader(const std::string& name) const {
     const auto* who = heard(name);
-    return who != nullptr && !silent(name) && who->last().lead == lead_ && who->last().mode == role::follow;
+    return who != nullptr && !silent(name) && who->last().lead == lead_ && who->last().mode == role::follow &&
+           who->last().from_leader.has_value();
 }
 
 std::optional<double> driver::from_leader(const motion& of, double behind, const std::string& name_ahead,
                                           const reference& ahead) const {
     const auto* leader = heard(lead_);
-    if (misses(lead_) && reports_leader(name_ahead)) {
-        const auto* who = heard(name_ahead);
-        if (leader == nullptr || who->silence(now_) < leader->silence(now_)) {
-            const double trend = setup_.law.q3 * who->last().j;
-            return leader_part(setup_.law, of, ahead, who->last().from_leader + trend * who->silence(now_));
-        }
+    const auto* who = reports_leader(name_ahead) ? heard(name_ahead) : nullptr;
+    if (who != nullptr && misses(lead_) && (leader == nullptr || who->silence(now_) < leader->silence(now_))) {
+        // The term contains q3 times the leader's acceleration, which nobody reports: all brake together, so it changes
+        // about as the command of the vehicle that reports it.
+        const double trend = setup_.law.q3 * who->last().j;
+        return leader_part_via(setup_.law, of, ahead, *who->last().from_leader + trend * who->silence(now_));
     }
     return leader == nullptr ? std::nullopt : std::optional{leader_part(setup_.law, of, reference_to(lead_, behind))};
 }
 
 double driver::law(const reference& ahead) {
     const auto part = setup_.uses_leader ? from_leader(self_, behind_, ahead_, ahead) : std::nullopt;
-    from_leader_ = part.value_or(0);
-    return spacing_law(setup_.law, self_, ahead, from_leader_, part ? weight_ : 0);
+    from_leader_ = part;
+    return spacing_law(setup_.law, self_, ahead, part.value_or(0), part ? weight_ : 0);
+}
+
+// Only while the two ahead are related as they were when the one ahead reported, and both obey the law.
+bool driver::may_infer(const state& ahead, const state& beyond) const {
+    const bool obeys = beyond.mode == role::lead || beyond.mode == role::follow || beyond.mode == role::degraded ||
+                       beyond.mode == role::radar;
+    return setup_.uses_leader && to_beyond_ && ahead.mode == role::follow && obeys && beyond.lead == ahead.lead &&
+           beyond.admits.empty() && !silent(beyond_) && (!silent(lead_) || reports_leader(beyond_));
 }
 
 // It obeys the same law, so that its command follows from what is ahead of it.
 void driver::infer_ahead() {
     const auto* ahead = heard(ahead_);
     const auto* beyond = heard(beyond_);
-    if (ahead == nullptr || beyond == nullptr || !misses(ahead_) || silent(beyond_) ||
-        ahead->last().mode != role::follow || beyond->last().mode == role::fallback || !setup_.uses_leader) {
+    if (ahead == nullptr || beyond == nullptr || !misses(ahead_) || !may_infer(ahead->last(), beyond->last())) {
         return;
     }
     const auto where = ahead->at(now_);
@@ -295,7 +315,7 @@ void driver::infer_ahead() {
         refuted_ = refuted_ || std::abs(seen.x + setup_.limits.length - where.x) > refuting_error ||
                    std::abs(seen.v - where.v) > refuting_speed;
     }
-    const auto what = reference_to(beyond_, ahead->last().behind - beyond->last().behind);
+    const auto what = reference_to(beyond_, *to_beyond_);
     const auto part = from_leader(where, ahead->last().behind, beyond_, what);
     if (part && !refuted_) {
         const double command = spacing_law(setup_.law, where, what, *part, 1);
@@ -349,8 +369,9 @@ void driver::follow_by_radar(double dt) {
     seen.x += setup_.limits.length;
     reference ahead{.where = seen, .command = seen.a, .distance = distance_};
     if (heard(ahead_) != nullptr) {
-        ahead = blend(reference_to(ahead_, distance_), ahead,
-                      std::min(1.0, (now_ - std::max(radar_since_, inferred_)) / radar_share_time));
+        // What was inferred counts in full, but once the radar has refuted it, as little as if nothing had been.
+        const double from = refuted_ ? radar_since_ : std::max(radar_since_, inferred_);
+        ahead = blend(reference_to(ahead_, distance_), ahead, std::min(1.0, (now_ - from) / radar_share_time));
     }
     command_ = law(ahead);
     if (since > hold_time) {
@@ -405,6 +426,9 @@ void driver::fall_back(double dt) {
 }
 
 state driver::report() const {
+    // What the actuators carry out, if their limits cut off what the compensation of the lag commands.
+    const double effective = self_.a + (applied_ - self_.a) * platoon_lag / setup_.limits.lag;
+    const double most = most_leader_part(setup_.law, most_speed, most_acceleration);
     return {.mode = leaving_ ? role::leave : mode_,
             .ahead = ahead_,
             .lead = lead_,
@@ -414,9 +438,10 @@ state driver::report() const {
             .x = self_.x,
             .v = self_.v,
             .a = self_.a,
-            .u = command_,
+            .u = effective,
             .j = trend_,
-            .from_leader = from_leader_,
+            .from_leader = from_leader_ ? std::optional{std::clamp(*from_leader_, -most, most)} : std::nullopt,
+            .lag = platoon_lag,
             .brake = setup_.limits.brake};
 }
 

@@ -44,7 +44,8 @@ class driver {
     /// The vehicles whose updates it needs, which depends on their updates.
     [[nodiscard]] std::set<std::string> needed() const;
     [[nodiscard]] bool needs(const std::string& name) const;
-    /// Processes an update of one of those. \param now the time of the last `step`, or a little later
+    /// Processes an update of one of those, and drops it if it is `implausible`. \param now the time of the last
+    /// `step`, or a little later
     void receive(const std::string& from, const state& heard, double now);
     /// Advances to this time with the present command, then computes the next one.
     void step(double now);
@@ -73,6 +74,8 @@ class driver {
 
     /// Called when the mode changes, with the reason.
     std::function<void(double now, role mode, const std::string& why)> on_change{};
+    /// Called once for each reason why updates of a vehicle are dropped.
+    std::function<void(double now, const std::string& from, const std::string& why)> on_drop{};
 
   private:
     void enter(role mode, const std::string& why);
@@ -85,10 +88,12 @@ class driver {
     void infer_ahead();
     [[nodiscard]] double law(const reference& ahead);
     [[nodiscard]] reference reference_to(const std::string& name, double distance) const;
-    /// What the leader adds to the command of a vehicle. \param ahead what is ahead of it
+    /// The leader's term in the law of a vehicle. \param ahead what is ahead of it
     [[nodiscard]] std::optional<double> from_leader(const motion& of, double behind, const std::string& name_ahead,
                                                     const reference& ahead) const;
     [[nodiscard]] bool reports_leader(const std::string& name) const;
+    [[nodiscard]] bool drops(const std::string& from, const state& told, double now);
+    [[nodiscard]] bool may_infer(const state& ahead, const state& beyond) const;
     [[nodiscard]] double keep_time_gap(double dt);
     [[nodiscard]] bool has_room() const;
     [[nodiscard]] double wanted() const;
@@ -106,24 +111,26 @@ class driver {
     double now_, began_;
     role mode_ = role::follow;
     bool leaving_ = false;
-    std::string ahead_, next_, lead_; ///< `next_`: the one ahead after the present one has left
-    std::string beyond_;              ///< the one ahead of the one ahead
-    std::string admits_;              ///< the vehicle that merges behind this one ...
-    double admits_until_ = 0;         ///< ... and when it is given up, or is in the lane
-    std::string makes_room_for_;      ///< the vehicle that merges ahead of this one
-    double distance_;                 ///< desired distance to the one ahead, which slowly approaches `wanted`
-    double behind_ = 0;               ///< desired distance to the leader
-    double weight_ = 0;               ///< of the leader
-    double doubt_ = 0;                ///< s, for which it has not counted
-    double from_leader_ = 0;          ///< what it adds to the command
-    double inferred_ = -1e9;          ///< when the one ahead was inferred from others last
-    bool refuted_ = false;            ///< by the radar, since its last update
+    std::string ahead_, next_, lead_;   ///< `next_`: the one ahead after the present one has left
+    std::string beyond_;                ///< the one ahead of the one ahead
+    std::string admits_;                ///< the vehicle that merges behind this one ...
+    double admits_until_ = 0;           ///< ... and when it is given up, or is in the lane
+    std::string makes_room_for_;        ///< the vehicle that merges ahead of this one
+    double distance_;                   ///< desired distance to the one ahead, which slowly approaches `wanted`
+    double behind_ = 0;                 ///< desired distance to the leader
+    double weight_ = 0;                 ///< of the leader
+    double doubt_ = 0;                  ///< s, for which it has not counted
+    std::optional<double> from_leader_; ///< its term in the law, if it has one
+    double inferred_ = -1e9;            ///< when the one ahead was inferred from others last
+    bool refuted_ = false;              ///< by the radar, since its last update
+    std::optional<double> to_beyond_;   ///< desired distance of the one ahead to the one beyond, of its last update
     double fallback_since_ = 0;
     double radar_since_ = 0, radar_until_ = -1e9;
     std::optional<double> time_gap_; ///< s, that it keeps by radar at present
     std::optional<double> cruise_;   ///< m/s, if it leads without a plan
     radar_track radar_;
     std::map<std::string, track> tracks_;
+    std::set<std::string> dropped_; ///< the reasons, with the vehicle
 };
 
 } // namespace platoon

@@ -7,6 +7,7 @@
 #include <boost/describe/class.hpp>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace platoon {
@@ -17,11 +18,11 @@ struct localization {
     role mode = role::follow;
     std::string ahead{}, lead{}, admits{};
     double behind = 0;
-    double utc = 0;          ///< s since 1970, by the sender's clock
-    double lat = 0, lon = 0; ///< degrees, of its front
-    double v = 0, a = 0;     ///< m/s, m/s²
-    double u = 0, j = 0;     ///< m/s², m/s³
-    double from_leader = 0;  ///< m/s²
+    double utc = 0;                      ///< s since 1970, by the sender's clock
+    double lat = 0, lon = 0;             ///< degrees, of its front
+    double v = 0, a = 0;                 ///< m/s, m/s²
+    double u = 0, j = 0;                 ///< m/s², m/s³
+    std::optional<double> from_leader{}; ///< m/s²
     double lag = 0, brake = 0;
     std::int64_t sent_ns = 0;
 };

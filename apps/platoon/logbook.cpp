@@ -59,8 +59,8 @@ std::optional<motion> logbook::position(const std::string& vehicle, double t) co
     if (end != ended_.end() && end->second) {
         return std::nullopt;
     }
-    return advance(before.position(), end != ended_.end() ? failsafe_command(before.u) : before.u, before.lag,
-                   t - before.t);
+    return end != ended_.end() ? without_driver(before, t)
+                               : advance(before.position(), before.u, before.lag, t - before.t);
 }
 
 } // namespace platoon

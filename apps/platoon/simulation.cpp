@@ -45,9 +45,9 @@ std::vector<motion> start_positions(const std::vector<vehicle_limits>& vehicles,
     return all;
 }
 
-double failsafe_command(double last_command) {
+motion without_driver(const state& last, double t) {
     constexpr double fail_safe = -3; // m/s²
-    return std::min(last_command, fail_safe);
+    return advance(last.position(), std::min(last.u, fail_safe), last.lag, t - last.t);
 }
 
 namespace {
@@ -171,8 +171,9 @@ class simulated_platoon {
 
     [[nodiscard]] motion truth(std::size_t i, double now) const {
         const auto& vehicle = all_[i];
-        const double command = vehicle.vanished ? failsafe_command(vehicle.who.command()) : vehicle.who.command();
-        return advance(vehicle.who.position(), command, vehicle.who.limits().lag, now - vehicle.who.now());
+        return vehicle.vanished ? without_driver(vehicle.who.report(), now)
+                                : advance(vehicle.who.position(), vehicle.who.command(), vehicle.who.limits().lag,
+                                          now - vehicle.who.now());
     }
 
     void decide(const scheduled_event& turn) {

@@ -55,8 +55,9 @@ struct sighting {
     bool in_lane = true;
 };
 
-/// The command of a vehicle without a driver: it keeps braking, and starts to brake if it did not.
-double failsafe_command(double last_command);
+/// The motion at `t` of a vehicle that has had no driver since this state: it keeps braking, and starts to brake if it
+/// did not.
+motion without_driver(const state& last, double t);
 
 /// A platoon in virtual time. \param watch is called a hundred times per second with all vehicles; those that join are
 /// added at the end

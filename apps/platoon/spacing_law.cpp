@@ -21,12 +21,16 @@ double wanted_distance(double spacing, double speed, double own_brake, double br
 }
 
 double leader_part(const gains& law, const motion& self, const reference& leader) {
-    return law.q3 * feed_forward(leader, law.leader_lead) + leader_part(law, self, leader, 0);
+    return law.q3 * feed_forward(leader, law.leader_lead) + leader_part_via(law, self, leader, 0);
 }
 
-double leader_part(const gains& law, const motion& self, const reference& ahead, double part_of_ahead) {
+double leader_part_via(const gains& law, const motion& self, const reference& ahead, double part_of_ahead) {
     return part_of_ahead - (law.q4 + law.lambda * law.q3) * (self.v - ahead.where.v) -
            law.lambda * law.q4 * error(law, self, ahead);
+}
+
+double most_leader_part(const gains& law, double speed, double acceleration) {
+    return law.q3 * acceleration + (law.q4 + law.lambda * law.q3) * speed + law.lambda * law.q4 * law.max_error;
 }
 
 double spacing_law(const gains& law, const motion& self, const reference& ahead, double from_leader, double weight) {

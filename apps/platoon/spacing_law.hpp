@@ -29,10 +29,12 @@ gains gains_for(double hz);
 /// in which the two come to a halt from this speed, so that no collision follows if both brake as hard as they can.
 double wanted_distance(double spacing, double speed, double own_brake, double brake_ahead);
 
-/// What the leader adds to the numerator of the law, m/s².
+/// The leader's term in the numerator of the law, m/s², without its weight.
 double leader_part(const gains& law, const motion& self, const reference& leader);
-/// The same without the leader, from what it adds for the vehicle ahead: both have the same leader.
-double leader_part(const gains& law, const motion& self, const reference& ahead, double part_of_ahead);
+/// The same without the leader, from the term of the vehicle ahead: both have the same leader.
+double leader_part_via(const gains& law, const motion& self, const reference& ahead, double part_of_ahead);
+/// Its largest absolute value, if no speed or acceleration exceeds these.
+double most_leader_part(const gains& law, double speed, double acceleration);
 
 /// The acceleration to command. \param weight of the leader: 1: full; 0: only the one ahead counts
 double spacing_law(const gains& law, const motion& self, const reference& ahead, double from_leader, double weight);

@@ -17,7 +17,7 @@ class track {
     [[nodiscard]] const state& last() const noexcept { return *last_; }
     /// How long it has been silent, by local time alone.
     [[nodiscard]] double silence(double now) const noexcept { return now - received_; }
-    /// Without an update, it is known from others that it commands this acceleration now.
+    /// It has sent no update, but what others report shows that it commands this acceleration now.
     void assume(double command, double now);
     /// The acceleration that it commands now, by extrapolation.
     [[nodiscard]] double command_at(double now) const;

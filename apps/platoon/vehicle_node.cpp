@@ -189,6 +189,9 @@ void vehicle_node::begin(const driver_setup& setup) {
     driver_->on_change = [this](double at, role mode, const std::string& why) {
         note(at, boost::describe::enum_to_string(mode, ""), why);
     };
+    driver_->on_drop = [this](double at, const std::string& from, const std::string& why) {
+        note(at, "dropped", "an update of " + from + ", because its " + why);
+    };
 }
 
 void vehicle_node::note(double at, const std::string& mode, const std::string& why) {
@@ -226,7 +229,10 @@ asio::awaitable<std::map<std::string, state>> vehicle_node::listen() {
         for (;;) {
             const auto item = co_await feed.async_next();
             if (item.has_value()) {
-                heard[item.publisher] = to_state(item.value, options_.start_utc);
+                const auto told = to_state(item.value, options_.start_utc);
+                if (implausible(told, options_.setup.law).empty()) {
+                    heard[item.publisher] = told;
+                }
             }
         }
     } catch (const cles::error& e) {
@@ -323,8 +329,8 @@ void vehicle_node::measure(double at) {
         seen_.clear();
         return;
     }
-    const double command = ended ? failsafe_command(ahead.u) : ahead.u; // as the observer of the drive assumes it
-    const auto there = advance(ahead.position(), command, ahead.lag, age);
+    // As the observer of the drive assumes it.
+    const auto there = ended ? without_driver(ahead, at) : advance(ahead.position(), ahead.u, ahead.lag, age);
     const auto self = advance(driver_->position(), driver_->command(), driver_->limits().lag, at - driver_->now());
     const echo exact{.range = there.x - driver_->limits().length - self.x, .rate = there.v - self.v};
     if (const auto seen = sensor_.measure(exact)) {
@@ -376,7 +382,9 @@ void vehicle_node::receive(const std::string& from, const state& heard, bool tim
             report_.latency_us.push_back(static_cast<double>(monotonic_ns() - heard.sent_ns) * 1e-3);
         }
     }
-    truth_[from] = heard;
+    if (implausible(heard, options_.setup.law).empty()) {
+        truth_[from] = heard;
+    }
     const auto later = link_from(from).next();
     if (!later) {
         report_.lost += counts ? 1 : 0;

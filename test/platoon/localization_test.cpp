@@ -1,9 +1,31 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/convert.hpp>
+
 #include "platoon/localization.hpp"
 
 #include <boost/test/unit_test.hpp>
 
 #include <cmath>
+#include <limits>
+#include <string>
+
+namespace localization {
+namespace {
+
+const std::string complete = R"({"mode":"follow","ahead":"v0","lead":"v0","admits":"","behind":15,"utc":1795000001,)"
+                             R"("lat":48.137,"lon":11.575,"v":25,"a":0,"u":0,"j":0,"lag":0.3,"brake":8,"sent_ns":1})";
+
+platoon::state received(const std::string& json) {
+    return to_state(cles::from_json<platoon::localization>(json), 1'795'000'000);
+}
+
+std::string replaced(const std::string& before, const std::string& after) {
+    auto text = complete;
+    return text.replace(text.find(before), before.size(), after);
+}
+
+} // namespace
+} // namespace localization
 
 BOOST_AUTO_TEST_SUITE(localization)
 
@@ -41,10 +63,39 @@ BOOST_AUTO_TEST_CASE(utc_and_a_place_on_earth_are_enough_for_a_vehicle) {
     BOOST_TEST(heard.a == told.a);
     BOOST_TEST(heard.u == told.u);
     BOOST_TEST(heard.j == told.j);
-    BOOST_TEST(heard.from_leader == told.from_leader);
+    BOOST_TEST((heard.from_leader == told.from_leader));
     BOOST_TEST(heard.lag == told.lag);
     BOOST_TEST(heard.brake == told.brake);
     BOOST_TEST(heard.sent_ns == told.sent_ns);
+}
+
+BOOST_AUTO_TEST_CASE(a_message_without_the_leaders_term_can_be_read) {
+    const auto old = received(complete);
+    BOOST_TEST(!old.from_leader);
+    BOOST_TEST(platoon::implausible(old, {}) == "");
+    BOOST_TEST(!received(replaced(R"("lag")", R"("from_leader":null,"lag")")).from_leader);
+    BOOST_TEST(*received(replaced(R"("lag")", R"("from_leader":-0.5,"lag")")).from_leader == -0.5);
+}
+
+BOOST_AUTO_TEST_CASE(what_no_vehicle_can_do_is_implausible) {
+    for (const std::string each : {R"("behind":15)", R"("utc":1795000001)", R"("lat":48.137)", R"("lon":11.575)",
+                                   R"("v":25)", R"("a":0)", R"("u":0)", R"("j":0)", R"("lag":0.3)", R"("brake":8)"}) {
+        const auto name = each.substr(0, each.find(':') + 1);
+        BOOST_TEST(platoon::implausible(received(replaced(each, name + "null")), {}) != "", name);
+    }
+    for (const std::string each : {R"("behind":15)", R"("utc":1795000001)", R"("v":25)", R"("a":0)", R"("u":0)",
+                                   R"("j":0)", R"("lag":0.3)", R"("brake":8)"}) {
+        const auto name = each.substr(0, each.find(':') + 1);
+        BOOST_TEST(platoon::implausible(received(replaced(each, name + "1e300")), {}) != "", name);
+        BOOST_TEST(platoon::implausible(received(replaced(each, name + "-1e300")), {}) != "", name);
+    }
+    for (const double brake : {0.0, -2.6, 21.0}) {
+        BOOST_TEST(platoon::implausible({.brake = brake}, {}) != "", brake);
+    }
+    BOOST_TEST(platoon::implausible({.lag = 0}, {}) == "lag is not positive");
+    BOOST_TEST(platoon::implausible({.from_leader = 60}, {}) != "");
+    BOOST_TEST(platoon::implausible({.from_leader = -30}, {}) == "");
+    BOOST_TEST(platoon::implausible({.from_leader = std::numeric_limits<double>::quiet_NaN()}, {}) != "");
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "platoon/logbook.hpp"
+#include "platoon/simulation.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -49,6 +50,15 @@ BOOST_AUTO_TEST_CASE(one_that_merges_is_not_in_the_lane_before) {
     book.add("v1", told(2, 20, 20));
     BOOST_TEST(!book.position("v1", 1.5));
     BOOST_TEST(book.position("v1", 2.5)->x == 30);
+}
+
+BOOST_AUTO_TEST_CASE(without_a_driver_a_vehicle_moves_as_in_the_simulation, *boost::unit_test::tolerance(1e-9)) {
+    platoon::logbook book;
+    const platoon::state last{.t = 1, .x = 0, .v = 20, .a = -2, .u = -5};
+    book.add("v1", last);
+    book.record_end("v1", false);
+    BOOST_TEST(book.position("v1", 1.5)->v == without_driver(last, 1.5).v);
+    BOOST_TEST(without_driver(last, 1.5).v == advance(last.position(), -5, last.lag, 0.5).v);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -29,11 +29,13 @@ platoon::scenario with(double hz, double loss) {
 // If any vehicle falls silent at any time, those behind it stop, those ahead continue, and none of them collides with
 // another. A vehicle without a driver may collide if those ahead brake harder than its own brakes do by themselves;
 // that is not tested.
-void drive_while_one_vanishes(bool fitted) {
+void drive_while_one_vanishes(bool fitted, double burst = 0, const platoon::spread& differences = {}) {
     for (const std::ptrdiff_t who : {0, 1, 5, 8, 9}) {
         for (const double at : {2.0, 5.5, 7.0, 12.0}) {
             for (const double hz : {10.0, 50.0}) {
                 auto what = with(hz, 0.1);
+                what.losses = platoon::losses_of(0.1, burst);
+                what.differences = differences;
                 what.setup.radar.fitted = fitted;
                 what.vehicles = 10;
                 what.incidents = {{platoon::incident::vanish, static_cast<std::size_t>(who), at}};
@@ -108,6 +110,10 @@ BOOST_AUTO_TEST_CASE(late_updates_do_no_harm) {
 BOOST_AUTO_TEST_CASE(whoever_vanishes_nobody_with_a_driver_collides) { drive_while_one_vanishes(false); }
 
 BOOST_AUTO_TEST_CASE(with_radars_too) { drive_while_one_vanishes(true); }
+
+BOOST_AUTO_TEST_CASE(with_bursts_and_different_lags_too) {
+    drive_while_one_vanishes(true, 3, {.least_lag = 0.2, .most_lag = 0.5});
+}
 
 BOOST_AUTO_TEST_CASE(with_a_radar_losses_in_bursts_cause_no_fallback) {
     auto what = with(10, 0);
@@ -193,7 +199,10 @@ BOOST_AUTO_TEST_CASE(bursts_rarely_make_errors_grow) {
     what.losses = platoon::losses_of(0.1, 3);
     int failures = 0;
     for (what.seed = 1; what.seed <= 40; ++what.seed) {
-        failures += simulate(what).string_ratio > platoon::stable_ratio ? 1 : 0;
+        const auto result = simulate(what);
+        BOOST_TEST(!result.collision);
+        BOOST_TEST(result.least_gap > 8.5);
+        failures += result.string_ratio > platoon::stable_ratio ? 1 : 0;
     }
     BOOST_TEST(failures <= 4); // 11, if others do not tell what one does whose updates are missing
 }
@@ -202,10 +211,15 @@ BOOST_AUTO_TEST_CASE(unless_brakes_are_too_weak_no_error_is_larger_than_the_firs
     auto what = with(25, 0.1);
     what.differences = {.least_lag = 0.2, .most_lag = 0.5, .least_brake = 7, .most_brake = 8};
     for (what.seed = 1; what.seed <= 5; ++what.seed) {
-        BOOST_TEST(simulate(what).first_ratio <= platoon::stable_ratio);
+        const auto result = simulate(what);
+        BOOST_TEST(!result.collision);
+        BOOST_TEST(result.least_gap > 8);
+        BOOST_TEST(result.first_ratio <= platoon::stable_ratio);
     }
     what.differences = {.least_brake = 5.5, .most_brake = 5.5}; // the second vehicle would have to brake harder
-    BOOST_TEST(simulate(what).first_ratio > platoon::stable_ratio);
+    const auto weak = simulate(what);
+    BOOST_TEST(!weak.collision);
+    BOOST_TEST(weak.first_ratio > platoon::stable_ratio);
 }
 
 BOOST_AUTO_TEST_CASE(with_different_lags_errors_do_not_grow_either) {
