@@ -60,7 +60,7 @@ struct manager {
     }
 };
 
-/// 0 if it is no number from 1 to the most.
+/// 0 if it is not a number from 1 to the most.
 std::uint64_t number(std::string_view text, std::uint64_t most) {
     std::uint64_t found = 0;
     const auto [end, failed] = std::from_chars(text.begin(), text.end(), found);

@@ -17,6 +17,17 @@ std::string fate_of(const cles::error& why) {
     return not_begun ? "refused" : "failed";
 }
 
+strike::order order_against(const fmv::track& target, double utc, const std::string& id) {
+    return {.id = id,
+            .lat = target.lat,
+            .lon = target.lon,
+            .ve = target.ve,
+            .vn = target.vn,
+            .sigma = target.sigma,
+            .sigma_v = target.sigma_v,
+            .utc = utc};
+}
+
 std::optional<fmv::track> commander::select_target(double seconds) const {
     std::optional<fmv::track> best;
     for (const auto& t : latest_.tracks) {

@@ -4,6 +4,7 @@
 #include <cles/error.hpp>
 
 #include "picture.hpp"
+#include "strike/order.hpp"
 
 #include <boost/describe/class.hpp>
 
@@ -28,6 +29,9 @@ BOOST_DESCRIBE_STRUCT(order_fates, (), (given, done, refused, failed, unknown, o
 
 /// How an order with this error has ended: "refused", "failed" or "unknown".
 std::string fate_of(const cles::error& why);
+
+/// The order to strike a track, as it was at that time.
+strike::order order_against(const fmv::track& target, double utc, const std::string& id);
 
 /// What the mission centre knows and has decided. It only decides; its caller sends and waits.
 class commander {

@@ -156,15 +156,8 @@ void mission::decide(const fmv::track& target) {
     const auto& seen = commander_.latest();
     auto record = begin_story(seen, target, received_utc_, utc_now());
     record.order = args_.name + "-" + run_ + "-" + std::to_string(commander_.fates().given + 1);
-    const strike::order what{.id = record.order,
-                             .lat = target.lat,
-                             .lon = target.lon,
-                             .ve = target.ve,
-                             .vn = target.vn,
-                             .sigma = target.sigma,
-                             .sigma_v = target.sigma_v,
-                             .utc = seen.captured,
-                             .deadline_ms = args_.deadline_ms};
+    auto what = order_against(target, seen.captured, record.order);
+    what.deadline_ms = args_.deadline_ms;
     commander_.ordered(target);
     events_.log("decided", "order " + record.order + ": strike target " + std::to_string(target.id), record);
     boost::asio::co_spawn(io_, give(what, std::move(record)), boost::asio::detached);

@@ -3,6 +3,7 @@
 
 #include <cles/convert.hpp>
 
+#include "commander.hpp"
 #include "fmv/frame_codec.hpp"
 #include "fmv/stream.hpp"
 #include "picture.hpp"
@@ -56,17 +57,6 @@ std::vector<rehearsed_target> film(const scene& ground, double begin_utc, double
     return out;
 }
 
-strike::order order_for(const fmv::track& t, double utc) {
-    return {.id = "rehearsal",
-            .lat = t.lat,
-            .lon = t.lon,
-            .ve = t.ve,
-            .vn = t.vn,
-            .sigma = t.sigma,
-            .sigma_v = t.sigma_v,
-            .utc = utc};
-}
-
 // How far a weapon misses, and how far it is expected to, m.
 struct miss {
     double by = 0;
@@ -79,7 +69,7 @@ std::optional<miss> released(const scene& ground, std::uint64_t seed, const rehe
     const auto own = strike::default_state(scans);
     strike::own_sensor sensor{seed, own.at};
     const double now = utc + delay_s;
-    const auto aimed = strike::engage(order_for(target.track, utc), now, own, sensor);
+    const auto aimed = strike::engage(order_against(target.track, utc, "rehearsal"), now, own, sensor);
     if (!aimed) {
         return std::nullopt;
     }

@@ -47,11 +47,7 @@ float brightness(const std::vector<float>& ground, geo::plane_position at) {
     const double y = std::clamp(ground_size.height / 2.0 - at.north / cell, 0.0, ground_size.height - 1.001);
     const auto u = static_cast<float>(x - std::floor(x));
     const auto v = static_cast<float>(y - std::floor(y));
-    const auto i = ground_size.at(static_cast<int>(x), static_cast<int>(y));
-    const auto below = i + static_cast<std::size_t>(ground_size.width);
-    const float upper = ground[i] + (ground[i + 1] - ground[i]) * u;
-    const float lower = ground[below] + (ground[below + 1] - ground[below]) * u;
-    return upper + (lower - upper) * v;
+    return fmv::between_pixels(ground, ground_size, ground_size.at(static_cast<int>(x), static_cast<int>(y)), u, v);
 }
 
 } // namespace

@@ -35,9 +35,8 @@ struct state {
     double behind = 0;    ///< its desired distance to the leader, m, front to front
     double t = 0;         ///< s, by the sender's clock: only differences are meaningful to others
     double x = 0, v = 0, a = 0;
-    double
-        u = 0,
-        j = 0; ///< the commanded acceleration from now on, as far as its actuators can, m/s², and how it changes, m/s³
+    /// The commanded acceleration from now on, as far as its actuators can, m/s², and how it changes, m/s³.
+    double u = 0, j = 0;
     /// The leader's term in the numerator of the control law, m/s², without its weight: others may not receive the
     /// leader. Empty if it has none.
     std::optional<double> from_leader{};

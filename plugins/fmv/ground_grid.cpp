@@ -32,7 +32,6 @@ point ground_grid::to_grid(geo::plane_position at) const noexcept {
 rectified ground_grid::rectify(const grey& frame, const geo::camera& from, point correction) const {
     const geo::projection view{from};
     rectified out{.pixels = grey(size_.pixels()), .seen = grey(size_.pixels())};
-    const auto below = static_cast<std::size_t>(size_.width);
     const auto seen_at = [&](double x, double y) {
         return view.seen(to_ground({.x = x - correction.x, .y = y - correction.y}));
     };
@@ -53,13 +52,10 @@ rectified ground_grid::rectify(const grey& frame, const geo::camera& from, point
             const int top = static_cast<int>(at->y);
             const auto u = static_cast<float>(at->x - left);
             const auto v = static_cast<float>(at->y - top);
-            const auto i = size_.at(left, top);
-            const auto value = [&frame](std::size_t k) { return static_cast<float>(frame[k]); };
-            const float upper = value(i) + (value(i + 1) - value(i)) * u;
-            const float lower = value(i + below) + (value(i + below + 1) - value(i + below)) * u;
+            const float brightness = between_pixels(frame, size_, size_.at(left, top), u, v);
             const auto to = size_.at(x, y);
             // NOLINTNEXTLINE(bugprone-incorrect-roundings): never negative, and a call for each pixel would cost more
-            out.pixels[to] = static_cast<std::uint8_t>(upper + (lower - upper) * v + 0.5F);
+            out.pixels[to] = static_cast<std::uint8_t>(brightness + 0.5F);
             out.seen[to] = 1;
         }
     }

@@ -2,6 +2,7 @@
 // What the aircraft's own fusion has to achieve, from the pixels to the impact: of 100 strikes 95 hit, and by the track
 // alone at most 70 do.
 #include "jadc2/rehearsal.hpp"
+#include "jadc2/vehicle_order.hpp"
 #include "strike/engagement.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -13,19 +14,7 @@ namespace {
 
 constexpr std::uint64_t strikes = CLES_DETECTION_IS_SLOW ? 12 : 100;
 
-// A track of a vehicle of that traffic, off by an error.
-strike::order order_for(const geo::traffic::motion& target, double utc, geo::plane_position off) {
-    const auto at = geo::tangent_plane{geo::traffic::origin}.to_geographic(
-        {.east = target.at.east + off.east, .north = target.at.north + off.north});
-    return {.id = "o1",
-            .lat = at.lat,
-            .lon = at.lon,
-            .ve = target.velocity.east,
-            .vn = target.velocity.north,
-            .sigma = 3,
-            .sigma_v = 1,
-            .utc = utc};
-}
+using jadc2::test::order_for;
 
 double missed_by(const strike::aim& aimed, const geo::traffic& traffic, std::size_t vehicle, double released) {
     const auto truth = traffic.at(released + aimed.after_s)[vehicle].at;

@@ -2,6 +2,7 @@
 #include <cles/service.hpp>
 
 #include "geo/traffic.hpp"
+#include "jadc2/vehicle_order.hpp"
 #include "strike/order.hpp"
 #include "strike/tasks.hpp"
 #include "support/answer.hpp"
@@ -80,16 +81,8 @@ BOOST_AUTO_TEST_CASE(what_its_own_sensor_sees_is_fused) {
     const auto target = *std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
         return std::hypot(a.at.east, a.at.north) < std::hypot(b.at.east, b.at.north); // so that it stays on its road
     });
-    const auto at = geo::tangent_plane{geo::traffic::origin}.to_geographic(target.at);
-    const strike::order what{.id = "o1",
-                             .lat = at.lat,
-                             .lon = at.lon,
-                             .ve = target.velocity.east,
-                             .vn = target.velocity.north,
-                             .sigma = 3,
-                             .sigma_v = 1,
-                             .utc = utc,
-                             .deadline_ms = 30'000};
+    auto what = jadc2::test::order_for(target, utc);
+    what.deadline_ms = 30'000;
     const auto out = cles::from_json<strike::outcome>(there.ask("DELEGATE self:strike " + cles::to_json(what)));
     BOOST_TEST(out.plots > 10U);
     BOOST_TEST(out.sigma < 2);
