@@ -47,8 +47,9 @@ BOOST_DESCRIBE_STRUCT(medians, (), (encode_ms, way_ms, queue_ms, run_ms))
 
 struct summary {
     frame_fates::totals frames{};
-    std::uint64_t judged = 0; ///< frames
-    double recall = 0;
+    std::uint64_t judged = 0;      ///< frames
+    std::uint64_t to_be_found = 0; ///< vehicles of these frames that had been in sight for long enough
+    double recall = 0;             ///< of them; 0 if there were none
     double false_per_frame = 0;
     double place_error = 0;    ///< m, per axis, root mean square
     double velocity_error = 0; ///< m/s, the same
@@ -56,7 +57,8 @@ struct summary {
     medians median{};
 };
 BOOST_DESCRIBE_STRUCT(summary, (),
-                      (frames, judged, recall, false_per_frame, place_error, velocity_error, picture_bytes, median))
+                      (frames, judged, to_be_found, recall, false_per_frame, place_error, velocity_error, picture_bytes,
+                       median))
 
 double microseconds(double ms) { return std::round(ms * 1000) / 1000; } // fewer digits make a message shorter
 
@@ -229,6 +231,7 @@ void recon::report() const {
     const auto& all = fates_.sums();
     const summary out{.frames = all,
                       .judged = evaluation_.found().sums().frames,
+                      .to_be_found = evaluation_.found().sums().vehicles,
                       .recall = evaluation_.found().recall(),
                       .false_per_frame = evaluation_.found().false_per_frame(),
                       .place_error = evaluation_.place_error(),
@@ -241,10 +244,11 @@ void recon::report() const {
                                  .run_ms = median_of(times_, &picture::run_ms)}};
     std::string text = std::to_string(all.captured) + " frames: " + std::to_string(all.done) + " done, " +
                        std::to_string(all.failed) + " failed, " + std::to_string(all.skipped) + " skipped; ";
-    text += out.judged == 0 ? "no frames scored"
-                            : "recall " + fixed(out.recall, 3) + ", " + fixed(out.false_per_frame, 3) +
-                                  " false tracks a frame, off by " + fixed(out.place_error, 1) + " m and " +
-                                  fixed(out.velocity_error, 1) + " m/s";
+    text += out.judged == 0        ? "no frames scored"
+            : out.to_be_found == 0 ? "no vehicle was in sight for long enough to be scored"
+                                   : "recall " + fixed(out.recall, 3) + ", " + fixed(out.false_per_frame, 3) +
+                                         " false tracks a frame, off by " + fixed(out.place_error, 1) + " m and " +
+                                         fixed(out.velocity_error, 1) + " m/s";
     events_.log("report", text, out);
 }
 

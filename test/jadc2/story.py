@@ -66,7 +66,7 @@ class StoryTest(unittest.TestCase):
             self.assertGreaterEqual(report["recall"], 0.9)
             # `jadc2.detection` requires 0.1 over many scenes. Here, one false track in few frames exceeds that.
             self.assertLessEqual(report["false_per_frame"], 0.5)
-        else:
+        elif report["to_be_found"]:  # not if the last strike came before a vehicle had been in sight for long enough
             self.assertGreater(report["recall"], 0)
 
         # No node knows others than those of its links.
