@@ -83,7 +83,7 @@ def gains(by_name, ms):
         yield figure(f"gain_{name}", f"{by_name[name]['meaning']}: times faster than the first host alone", values, "times",
                      paper, "> 1, with its interval" if wanted else None, (lambda _, found=surely: found) if wanted else None,
                      ran=f"DELEGATE from the second host to both, and to the first alone on the same cores; {SAME_WORK}")
-    yield figure("gain_most", "the most that can be gained, by the times of the threads on each host alone",
+    yield figure("gain_predicted", "the gain that the times of threads on each host alone predict",
                  (a / together((a, b)) for a, b in zip(ms["local_all_near_reduced"], ms["local_all_far"])), "times",
                  PAPER_MS["local_all_near"] / together((PAPER_MS["local_all_near"], PAPER_MS["local_all_far"])),
                  ran=f"threads on the first host, and on both without any loss; {SAME_SHARDS}")
@@ -126,7 +126,7 @@ def trials(by_name, period_ms):
 
 
 def speed_ups(rows, ms, hosts, threads):
-    """Each has a `most` beside it: what as many cores could reach, by the speed of one thread."""
+    """Each has `predicted` beside it: what as many cores reach if each is as fast as with one thread alone."""
     one = ms["local_one_near"]
     second = statistics.median(a / b for a, b in zip(one, ms["local_one_far"]))
     cores = {"near": min(threads, len(hosts["cores"])), "near_reduced": min(threads, len(hosts["near_reduced_cores"])),
@@ -143,8 +143,8 @@ def speed_ups(rows, ms, hosts, threads):
                        ran=f"one thread without CLES, and this row (the paper: {PAPER_THREADS} threads a host); {SAME_WORK}")
         used, paper_used = CORES.get(name), CORES.get(name, ()) if name != "both_asked_by_far" else ("near", "far")
         if used:
-            found["most"] = sum(cores[each] for each in used)
-            found["paper_most"] = sum(paper_cores[each] for each in paper_used) if paper else None
+            found["predicted"] = sum(cores[each] for each in used)
+            found["paper_predicted"] = sum(paper_cores[each] for each in paper_used) if paper else None
         yield found
 
 

@@ -10,8 +10,8 @@ from .gnuplot import Missing, block, draw, line_style, quoted
 
 def kinds(raw, note):
     shown = [
-        ("dsgd", "Table 2 as speed-ups over one thread on the first host, drawn as a share of the most that the cores of the row "
-         "could reach by the speed of one thread. The paper's machines ran 4 threads each.", lambda: speed_ups(raw, note)),
+        ("dsgd", "Table 2 as speed-ups over one thread on the first host, drawn as a share of what the cores of the row "
+         "reach if each is as fast as with one thread alone. The paper's machines ran 4 threads each.", lambda: speed_ups(raw, note)),
         ("dsgd_cost", "What DELEGATE costs: elapsed time to that of threads on the same cores without CLES; for both hosts, to "
          "threads on both without any loss. 1 means no cost; less is chance. The trial before shards by speed is a part of "
          "its bar.", lambda: costs(raw, note))]
@@ -50,16 +50,16 @@ plot $class0 using 1:2 with points pointtype 7 pointsize {0.35 if half_a_side el
 
 
 def speed_ups(raw, note):
-    def part(value, most):
-        return f"{value:.3g} of {most:.3g}"
+    def part(value, predicted):
+        return f"{value:.3g} of {predicted:.3g}"
 
     found = []
     for meaning, each, _ in _ratios(raw, "speed_up_"):
-        if "most" in each:
-            scaled = tuple(each[end] / each["most"] for end in ("value", "low", "high"))
-            paper = each["paper"] and (each["paper"] / each["paper_most"], part(each["paper"], each["paper_most"]))
-            found.append((meaning, scaled, part(each["value"], each["most"]), paper, 0))
-    return bars("dsgd", found, "speed-up, as a share of the most", note)
+        if "predicted" in each:
+            scaled = tuple(each[end] / each["predicted"] for end in ("value", "low", "high"))
+            paper = each["paper"] and (each["paper"] / each["paper_predicted"], part(each["paper"], each["paper_predicted"]))
+            found.append((meaning, scaled, part(each["value"], each["predicted"]), paper, 0))
+    return bars("dsgd", found, "speed-up, as a share of that of cores with one thread each", note)
 
 
 def costs(raw, note):
@@ -130,7 +130,7 @@ def sizes(raw, note):
         return ", ".join(f"${name} using 1:2:3:4 with yerrorlines {line_style(list(lines).index(name))} title '{titles[name]}'"
                          for name in names)
 
-    most = next((each["value"] for each in raw["figures"] if each["name"] == "gain_most"), 1)
+    predicted = next((each["value"] for each in raw["figures"] if each["name"] == "gain_predicted"), 1)
     return draw("dsgd_sizes", "".join(block(name, rows) for name, rows in lines.items()) + f"""set logscale x
 set xrange {ends("paper")}
 set xlabel 'time of a shard, ms'
@@ -153,7 +153,7 @@ set lmargin at screen 0.56
 set rmargin at screen 0.97
 set key at screen 0.56,0.97 left top Left reverse samplen 3
 set title 'both hosts: times faster than the first alone' offset 0,-0.5
-plot {plot("even", "resplit")}, {most!r} with lines linecolor '#999999' dashtype (2,4) linewidth 1.5 title 'the most', \\
+plot {plot("even", "resplit")}, {predicted!r} with lines linecolor '#999999' dashtype (2,4) linewidth 1.5 title 'as each host alone predicts', \\
      1 with lines linecolor '#cccccc' notitle
 unset multiplot
 """, 860, 460, note)
