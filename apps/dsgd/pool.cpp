@@ -27,7 +27,7 @@ struct offers {
 };
 BOOST_DESCRIBE_STRUCT(offers, (), (results, errors))
 
-// For a node that is busy as well; one that has stopped takes all of it.
+// For a node that is busy as well; one that has stopped takes all of it, and so does an address at which none listens.
 constexpr std::chrono::seconds find_deadline{5};
 
 struct pool::round {
@@ -67,12 +67,23 @@ pool::pool(const std::vector<std::string>& seeds, std::chrono::seconds deadline,
 
 std::map<std::string, sgd::recipe> pool::find() {
     offers found;
-    try {
-        found = cles::from_json<offers>(node_.request("PULL all:sgd", cles::call_options{}.deadline(find_deadline)));
-    } catch (const cles::error& e) {
-        const bool alone = e.code() == cles::errc::no_target && node_.peers().empty();
-        throw cles::error(e.code(), alone ? "no node answers at the given address (--at): is clesd running there?"
-                                          : e.message() + ": is libcles-sgd.so among the plugins of a node?");
+    const auto until = steady::now() + find_deadline;
+    for (bool asks = true; asks;) {
+        try {
+            found =
+                cles::from_json<offers>(node_.request("PULL all:sgd", cles::call_options{}.deadline(find_deadline)));
+            asks = false;
+        } catch (const cles::error& e) {
+            const bool alone = e.code() == cles::errc::no_target && node_.peers().empty();
+            if (!alone) {
+                throw cles::error(e.code(), e.message() + ": is libcles-sgd.so among the plugins of a node?");
+            }
+            if (steady::now() >= until) {
+                throw cles::error(e.code(), "no node answers at the given address (--at): is clesd running there?");
+            }
+            io_.restart(); // a node on a busy machine may answer later
+            io_.run_for(std::chrono::milliseconds{50});
+        }
     }
     std::string silent;
     for (const auto& [name, why] : found.errors) {

@@ -48,8 +48,8 @@ BOOST_DESCRIBE_STRUCT(medians, (), (encode_ms, way_ms, queue_ms, run_ms))
 struct summary {
     frame_fates::totals frames{};
     std::uint64_t judged = 0;      ///< frames
-    std::uint64_t to_be_found = 0; ///< vehicles of these frames that had been in sight for long enough
-    double recall = 0;             ///< of them; 0 if there were none
+    std::uint64_t to_be_found = 0; ///< vehicles in sight for long enough, summed over these frames
+    double recall = 0;             ///< the share of them that was found; 0 if there were none
     double false_per_frame = 0;
     double place_error = 0;    ///< m, per axis, root mean square
     double velocity_error = 0; ///< m/s, the same
@@ -244,11 +244,13 @@ void recon::report() const {
                                  .run_ms = median_of(times_, &picture::run_ms)}};
     std::string text = std::to_string(all.captured) + " frames: " + std::to_string(all.done) + " done, " +
                        std::to_string(all.failed) + " failed, " + std::to_string(all.skipped) + " skipped; ";
-    text += out.judged == 0        ? "no frames scored"
-            : out.to_be_found == 0 ? "no vehicle was in sight for long enough to be scored"
-                                   : "recall " + fixed(out.recall, 3) + ", " + fixed(out.false_per_frame, 3) +
-                                         " false tracks a frame, off by " + fixed(out.place_error, 1) + " m and " +
-                                         fixed(out.velocity_error, 1) + " m/s";
+    if (out.judged == 0) {
+        text += "no frames scored";
+    } else {
+        text += (out.to_be_found == 0 ? "no vehicle in sight for long enough" : "recall " + fixed(out.recall, 3)) +
+                ", " + fixed(out.false_per_frame, 3) + " false tracks a frame, off by " + fixed(out.place_error, 1) +
+                " m and " + fixed(out.velocity_error, 1) + " m/s";
+    }
     events_.log("report", text, out);
 }
 

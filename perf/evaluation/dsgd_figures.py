@@ -126,7 +126,7 @@ def trials(by_name, period_ms):
 
 
 def speed_ups(rows, ms, hosts, threads):
-    """Each has `predicted` beside it: what as many cores reach if each is as fast as with one thread alone."""
+    """Each has `predicted` beside it: the sum of the speeds of its cores, each measured with one thread."""
     one = ms["local_one_near"]
     second = statistics.median(a / b for a, b in zip(one, ms["local_one_far"]))
     cores = {"near": min(threads, len(hosts["cores"])), "near_reduced": min(threads, len(hosts["near_reduced_cores"])),

@@ -10,11 +10,11 @@ from .gnuplot import Missing, block, draw, line_style, quoted
 
 def kinds(raw, note):
     shown = [
-        ("dsgd", "Table 2 as speed-ups over one thread on the first host, drawn as a share of what the cores of the row "
-         "reach if each is as fast as with one thread alone. The paper's machines ran 4 threads each.", lambda: speed_ups(raw, note)),
+        ("dsgd", "Table 2 as speed-ups over one thread on the first host, drawn as a share of the sum of the speeds of the "
+         "row's cores, each measured with one thread. The paper's machines ran 4 threads each.", lambda: speed_ups(raw, note)),
         ("dsgd_cost", "What DELEGATE costs: elapsed time to that of threads on the same cores without CLES; for both hosts, to "
-         "threads on both without any loss. 1 means no cost; less is chance. The trial before shards by speed is a part of "
-         "its bar.", lambda: costs(raw, note))]
+         "threads on both without any loss. 1 means no cost; less is chance, except with re-splitting, where the reason is not known. The trial before "
+         "shards by speed is a part of its bar.", lambda: costs(raw, note))]
     if raw.get("sizes"):
         shown.append(("dsgd_sizes", "Left: what DELEGATE adds on the same host, by the time of a shard without CLES (values of "
                       "zero or less are not drawn). Right: how many times faster both hosts are than the first alone, by the "
@@ -59,7 +59,7 @@ def speed_ups(raw, note):
             scaled = tuple(each[end] / each["predicted"] for end in ("value", "low", "high"))
             paper = each["paper"] and (each["paper"] / each["paper_predicted"], part(each["paper"], each["paper_predicted"]))
             found.append((meaning, scaled, part(each["value"], each["predicted"]), paper, 0))
-    return bars("dsgd", found, "speed-up, as a share of that of cores with one thread each", note)
+    return bars("dsgd", found, "speed-up, as a share of the sum of the speeds of its cores", note)
 
 
 def costs(raw, note):
@@ -130,7 +130,8 @@ def sizes(raw, note):
         return ", ".join(f"${name} using 1:2:3:4 with yerrorlines {line_style(list(lines).index(name))} title '{titles[name]}'"
                          for name in names)
 
-    predicted = next((each["value"] for each in raw["figures"] if each["name"] == "gain_predicted"), 1)
+    predicted = "".join(f"{each['value']!r} with lines linecolor '#999999' dashtype (2,4) linewidth 1.5 title "
+                        "'as each host alone predicts', " for each in raw["figures"] if each["name"] == "gain_predicted")
     return draw("dsgd_sizes", "".join(block(name, rows) for name, rows in lines.items()) + f"""set logscale x
 set xrange {ends("paper")}
 set xlabel 'time of a shard, ms'
@@ -153,7 +154,7 @@ set lmargin at screen 0.56
 set rmargin at screen 0.97
 set key at screen 0.56,0.97 left top Left reverse samplen 3
 set title 'both hosts: times faster than the first alone' offset 0,-0.5
-plot {plot("even", "resplit")}, {predicted!r} with lines linecolor '#999999' dashtype (2,4) linewidth 1.5 title 'as each host alone predicts', \\
+plot {plot("even", "resplit")}, {predicted}\\
      1 with lines linecolor '#cccccc' notitle
 unset multiplot
 """, 860, 460, note)

@@ -51,12 +51,7 @@ class Story(StoryTest):
                                       "--deadline", "20000") for fleet in (plain, secured)]:
                 self.assertEqual(recon.end(), 0)
                 report = recon.all("report")[0]["data"]
-                self.assertGreater(report["judged"], 0)
-                if PATIENCE > 30 and report["frames"]["skipped"] > 5:
-                    continue  # too slow with a sanitizer on a busy machine: between frames, vehicles move too far
-                self.assertGreaterEqual(report["recall"], 0.9)  # as in `jadc2.detection`
-                # `jadc2.detection` requires 0.1 over many scenes. Here, one false track in few frames exceeds that.
-                self.assertLessEqual(report["false_per_frame"], 0.5)
+                self.check_found(report, PATIENCE > 30 and report["frames"]["skipped"] > 5)
 
     def test_the_script_shows_it(self):
         script = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "scripts", "jadc2")

@@ -34,6 +34,15 @@ class StoryTest(unittest.TestCase):
         self.assertGreater(told["outcome"]["plots"], 10)  # its own sensor's
         return told
 
+    def check_found(self, report, slow):
+        self.assertGreater(report["judged"], 0)
+        if not slow:
+            self.assertGreaterEqual(report["recall"], 0.9)  # as in `jadc2.detection`
+            # `jadc2.detection` requires 0.1 over many scenes. Here, one false track in few frames exceeds that.
+            self.assertLessEqual(report["false_per_frame"], 0.5)
+        elif report["to_be_found"]:  # few frames are processed, between which vehicles move far: perhaps none for long enough
+            self.assertGreater(report["recall"], 0)
+
     def run_story(self, fleet):
         satellite, striker = fleet.satellite(), fleet.striker()
         # Frames must not fail on a busy machine. Under a sanitizer most would be skipped, and too few of them evaluated.
@@ -61,13 +70,7 @@ class StoryTest(unittest.TestCase):
         self.assertEqual(frames["nodes"], ["sat1"], frames)
         self.assertLessEqual(set(frames["failures"]), {"no_target"}, recon.events)  # before it was found
         self.assertEqual(satellite.pull("sat1:FMV_Processing")["frames"], frames["done"])
-        self.assertGreater(report["judged"], 0)
-        if PATIENCE <= 30:
-            self.assertGreaterEqual(report["recall"], 0.9)
-            # `jadc2.detection` requires 0.1 over many scenes. Here, one false track in few frames exceeds that.
-            self.assertLessEqual(report["false_per_frame"], 0.5)
-        elif report["to_be_found"]:  # not if the last strike came before a vehicle had been in sight for long enough
-            self.assertGreater(report["recall"], 0)
+        self.check_found(report, PATIENCE > 30)
 
         # No node knows others than those of its links.
         self.assertEqual(satellite.peers(), set())
