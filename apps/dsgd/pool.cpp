@@ -7,6 +7,7 @@
 
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <utility>
 
 #include <unistd.h>
@@ -66,16 +67,14 @@ pool::pool(const std::vector<std::string>& seeds, std::chrono::seconds deadline,
 }
 
 std::map<std::string, sgd::recipe> pool::find() {
-    offers found;
     const auto until = steady::now() + find_deadline;
-    for (bool asks = true; asks;) {
+    std::optional<offers> found;
+    while (!found) {
         try {
             found =
                 cles::from_json<offers>(node_.request("PULL all:sgd", cles::call_options{}.deadline(find_deadline)));
-            asks = false;
         } catch (const cles::error& e) {
-            const bool alone = e.code() == cles::errc::no_target && node_.peers().empty();
-            if (!alone) {
+            if (e.code() != cles::errc::no_target || !node_.peers().empty()) {
                 throw cles::error(e.code(), e.message() + ": is libcles-sgd.so among the plugins of a node?");
             }
             if (steady::now() >= until) {
@@ -86,14 +85,14 @@ std::map<std::string, sgd::recipe> pool::find() {
         }
     }
     std::string silent;
-    for (const auto& [name, why] : found.errors) {
+    for (const auto& [name, why] : found->errors) {
         std::fprintf(stderr, "cles-dsgd: %s does not take part: %s\n", name.c_str(), why.message.c_str());
         silent += (silent.empty() ? "" : ", ") + name;
     }
-    if (found.results.empty()) {
+    if (found->results.empty()) {
         throw cles::error(cles::errc::deadline, "no node that offers 'sgd' answers: " + silent);
     }
-    return found.results;
+    return found->results;
 }
 
 void pool::train(board& all, const char* what) {
