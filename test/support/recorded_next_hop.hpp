@@ -21,6 +21,7 @@ class recorded_next_hop final : public core::next_hop {
         std::uint64_t ticket = 0;
         std::string node;
         std::string text; ///< "PULL car2:speed hops=7 via=car1 {}", as far as present
+        std::string line; ///< as it is written on a link, with its LF
         time_point deadline{};
         protocol::carried_adverbs carried{};
         bool cancelled = false;
@@ -48,6 +49,11 @@ class recorded_next_hop final : public core::next_hop {
         for (const auto part : {r.adverbs, r.body}) {
             made->text.append(part.empty() ? "" : " ").append(part);
         }
+        auto whole = r;
+        whole.id = made->ticket;
+        whole.deadline_ms = 1;
+        whole.wants_progress = static_cast<bool>(progress);
+        protocol::append_request(made->line, whole);
         made->deadline = deadline;
         made->carried = r.carried;
         made->reply = std::move(reply);

@@ -13,7 +13,7 @@ namespace cles {
 
 /// The peer of a link, as far as the transport knows it. Complete when the first line arrives.
 struct identity {
-    std::string transport;            ///< "tcp", "tls", "udp", "unix", "inproc", "multicast", "pool"
+    std::string transport;            ///< the scheme of its URL, such as "tcp"; or "multicast"
     std::string address;              ///< as a URL; for clients of a Unix socket, the socket that they connected to
     std::string name;                 ///< the node's authenticated name; empty if the transport authenticates none
     std::optional<std::uint32_t> uid; ///< of the process, if the kernel reports it (Unix sockets)

@@ -74,7 +74,7 @@ typedef struct cles_request {
     size_t parameter_count;
     cles_text body;           /* valid JSON; {} if there is none */
     int64_t left_ns;          /* time until the requester stops waiting; 0 if not known */
-    cles_text peer_transport; /* the requester: "tcp", "tls", "udp", "unix", "inproc" ... */
+    cles_text peer_transport; /* the requester: the scheme of its URL, such as "tcp"; or "multicast" */
     cles_text peer_address;   /* as a URL */
     cles_text peer_name;      /* the node's authenticated name; empty if there is none */
     int64_t peer_uid;         /* of the process, if the kernel reports it; otherwise -1 */

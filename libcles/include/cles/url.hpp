@@ -34,4 +34,7 @@ url parse_url(std::string_view text);
 
 std::string to_string(const url& u);
 
+/// Whether links of that scheme never leave a host, as those of `unix` and `inproc`. URLs of it mean nothing elsewhere.
+bool stays_on_host(std::string_view scheme) noexcept;
+
 } // namespace cles

@@ -126,7 +126,7 @@ bool asio_environment::has_transport(std::string_view scheme) const { return fin
 
 bool asio_environment::is_trusted(const url& where) const {
     const auto* by = find(where.scheme);
-    return where.scheme == "inproc" || where.scheme == "unix" || (by != nullptr && by->authenticates());
+    return stays_on_host(where.scheme) || (by != nullptr && by->authenticates());
 }
 
 bool asio_environment::is_exposed(const url& where) const {

@@ -77,30 +77,41 @@ struct known_adverb {
     std::string_view key;
     unsigned verbs;                                         ///< a bit for each on which it means something
     bool (*apply)(std::string_view value, request_line& r); ///< returns whether the value is valid
+    /// Whether it is a member of `outgoing_request`, which `append_request` writes. The others are part of its
+    /// `adverbs`.
+    bool is_member = false;
 };
 
 constexpr auto on_all = on(verb::pull, verb::push, verb::delegate, verb::bind, verb::update);
 constexpr std::array known_adverbs{
     known_adverb{"id", on_all,
-                 [](std::string_view v, request_line& r) { return take(r.id, number_between(v, 1, max_id)); }},
+                 [](std::string_view v, request_line& r) { return take(r.id, number_between(v, 1, max_id)); }, true},
     known_adverb{
         "deadline", on_all,
-        [](std::string_view v, request_line& r) { return take(r.deadline_ms, number_between(v, 1, max_deadline_ms)); }},
+        [](std::string_view v, request_line& r) { return take(r.deadline_ms, number_between(v, 1, max_deadline_ms)); },
+        true},
     known_adverb{"reply", on(verb::push, verb::update),
-                 [](std::string_view v, request_line& r) { return take_flag(r.wants_reply, false, v == "no"); }},
-    known_adverb{"hops", on_all,
-                 [](std::string_view v, request_line& r) { return take(r.hops, number_between(v, 0, max_hops)); }},
+                 [](std::string_view v, request_line& r) { return take_flag(r.wants_reply, false, v == "no"); }, true},
     known_adverb{"progress", on(verb::delegate),
-                 [](std::string_view v, request_line& r) { return take_flag(r.wants_progress, true, v == "yes"); }},
+                 [](std::string_view v, request_line& r) { return take_flag(r.wants_progress, true, v == "yes"); },
+                 true},
     known_adverb{"urgent", on(verb::pull, verb::push, verb::delegate),
-                 [](std::string_view v, request_line& r) { return take_flag(r.urgent, true, v == "yes"); }},
+                 [](std::string_view v, request_line& r) { return take_flag(r.urgent, true, v == "yes"); }, true},
+    known_adverb{"trace", on_all, take_trace, true},
     known_adverb{"lease", on(verb::bind),
-                 [](std::string_view v, request_line& r) { return take(r.lease_ms, lease_from(v)); }},
+                 [](std::string_view v, request_line& r) { return take(r.lease_ms, lease_from(v)); }, true},
     known_adverb{
         "every", on(verb::bind),
-        [](std::string_view v, request_line& r) { return take(r.every_ms, number_between(v, 1, max_deadline_ms)); }},
+        [](std::string_view v, request_line& r) { return take(r.every_ms, number_between(v, 1, max_deadline_ms)); },
+        true},
     known_adverb{"keep", on(verb::bind),
-                 [](std::string_view v, request_line& r) { return take(r.keep, number_between(v, 1, max_keep)); }},
+                 [](std::string_view v, request_line& r) { return take(r.keep, number_between(v, 1, max_keep)); },
+                 true},
+    known_adverb{"hops", on_all,
+                 [](std::string_view v, request_line& r) { return take(r.hops, number_between(v, 0, max_hops)); },
+                 true},
+    known_adverb{"mark", on(verb::bind),
+                 [](std::string_view v, request_line& r) { return take_flag(r.wants_mark, true, v == "yes"); }, true},
     known_adverb{"seq", on(verb::update),
                  [](std::string_view v, request_line& r) { return take(r.seq, number_between(v, 1, max_id)); }},
     known_adverb{"epoch", on(verb::update),
@@ -115,10 +126,7 @@ constexpr std::array known_adverbs{
     known_adverb{"routes", on(verb::pull),
                  [](std::string_view v, request_line& r) { return take_routes(r.routes, v); }},
     known_adverb{"grant", on(verb::push, verb::delegate),
-                 [](std::string_view v, request_line& r) { return take(r.grant, parse_grant(v)); }},
-    known_adverb{"mark", on(verb::bind),
-                 [](std::string_view v, request_line& r) { return take_flag(r.wants_mark, true, v == "yes"); }},
-    known_adverb{"trace", on_all, take_trace}};
+                 [](std::string_view v, request_line& r) { return take(r.grant, parse_grant(v)); }}};
 
 /// Its index; past the end: it is not defined for that verb.
 std::size_t find_known(std::string_view key, verb v) noexcept {
@@ -231,6 +239,11 @@ bool parse_group_message(std::string_view datagram, request_line& out) {
 
 bool is_known_adverb(std::string_view key, verb v) noexcept { return find_known(key, v) != known_adverbs.size(); }
 
+std::size_t max_written_adverbs(verb v) noexcept {
+    return static_cast<std::size_t>(std::ranges::count_if(
+        known_adverbs, [v](const known_adverb& each) { return each.is_member && (each.verbs & on(v)) != 0; }));
+}
+
 malformed_request salvage(std::string_view line) {
     malformed_request result;
     part_reader parts{line};
@@ -306,6 +319,9 @@ void append_request(std::string& out, const outgoing_request& request) {
     }
     if (request.hops != default_hops) {
         append_adverb(out, "hops", request.hops);
+    }
+    if (request.wants_mark) {
+        out.append(" mark=yes");
     }
     if (!request.adverbs.empty()) {
         out.push_back(' ');

@@ -47,6 +47,7 @@ struct carried_adverbs {
     bool urgent = false;
     trace_context trace{};
 
+    bool operator==(const carried_adverbs&) const = default;
     /// These, of whatever has them.
     [[nodiscard]] const carried_adverbs& carried() const noexcept { return *this; }
 };
@@ -106,6 +107,9 @@ bool parse_group_message(std::string_view datagram, request_line& out);
 /// Whether this version defines an adverb of that key for that verb.
 bool is_known_adverb(std::string_view key, verb v) noexcept;
 
+/// How many adverbs `append_request` writes at most for a request of that verb, besides `outgoing_request::adverbs`.
+std::size_t max_written_adverbs(verb v) noexcept;
+
 /// What the parts before the body contain for a reply to a malformed line.
 [[gnu::cold]] malformed_request salvage(std::string_view line);
 
@@ -122,7 +126,8 @@ struct outgoing_request {
     std::uint32_t every_ms = 0;
     std::uint32_t keep = 0;
     std::uint32_t hops = default_hops; ///< not written if it is the default
-    std::string_view adverbs{};        ///< further ones, in wire format
+    bool wants_mark = false;
+    std::string_view adverbs{}; ///< further ones, in wire format
     std::string_view body{};
 
     /// The node that the noun names.

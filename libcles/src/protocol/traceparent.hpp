@@ -24,6 +24,7 @@ struct trace_context {
     std::uint64_t span = 0; ///< 0: the request belongs to no trace
     bool sampled = false;   ///< nodes record what it causes
 
+    bool operator==(const trace_context&) const = default;
     [[nodiscard]] explicit operator bool() const noexcept { return span != 0; }
 };
 

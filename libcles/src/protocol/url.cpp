@@ -130,4 +130,6 @@ std::string to_string(const url& u) {
     return text;
 }
 
+bool stays_on_host(std::string_view scheme) noexcept { return scheme == "unix" || scheme == "inproc"; }
+
 } // namespace cles

@@ -8,6 +8,7 @@
 #include "protocol/reply_line.hpp"
 
 #include <string>
+#include <string_view>
 
 namespace cles::fuzz {
 namespace {
@@ -37,29 +38,78 @@ void check_noun(const p::noun_view& noun) {
     require(same.parameters.size() == noun.parameters.size(), "it has as many parameters", canonical);
 }
 
-std::string written(const p::request_line& r) {
-    std::string noun{r.noun.target};
-    noun.append(":").append(r.noun.path);
-    std::string adverbs = "hops=" + std::to_string(r.hops);
-    if (!r.via.empty()) {
-        adverbs.append(" via=").append(r.via);
+/// The adverbs that are no members of `outgoing_request`.
+std::string further_adverbs(const p::request_line& r) {
+    std::string all;
+    const auto add = [&all](std::string_view key, std::string_view value) {
+        if (!value.empty()) {
+            all.append(all.empty() ? "" : " ").append(key).append("=").append(value);
+        }
+    };
+    add("via", r.via);
+    add("from", r.from);
+    add("sig", r.sig);
+    add("since", r.since);
+    add("describe", r.describe);
+    if (r.routes.distance != 0) {
+        add("routes", std::to_string(r.routes.distance).append(".").append(r.routes.by));
+    }
+    if (r.grant != 0) {
+        add("grant", p::grant_text(r.grant));
     }
     if (r.is_update()) {
-        adverbs += " seq=" + std::to_string(*r.seq) + " epoch=" + p::epoch_text(*r.epoch);
+        add("seq", std::to_string(*r.seq));
+        add("epoch", p::epoch_text(*r.epoch));
     }
+    return all;
+}
+
+std::string written(const p::request_line& r) {
+    const auto path = std::string{r.noun.target}.append(":").append(r.noun.path);
+    const auto further = further_adverbs(r);
+    p::outgoing_request out;
+    // All members, so that a new one does not compile until it is set here.
+    auto& [verb, noun, id, deadline_ms, wants_reply, wants_progress, carried, lease_ms, every_ms, keep, hops,
+           wants_mark, adverbs, body] = out;
+    verb = r.verb;
+    noun = path;
+    id = r.id;
+    deadline_ms = r.deadline_ms;
+    wants_reply = r.wants_reply;
+    wants_progress = r.wants_progress;
+    carried = r.carried();
+    lease_ms = r.lease_ms;
+    every_ms = r.every_ms;
+    keep = r.keep;
+    hops = r.hops;
+    wants_mark = r.wants_mark;
+    adverbs = further;
+    body = r.body;
     std::string text;
-    p::append_request(text, {.verb = r.verb,
-                             .noun = noun,
-                             .id = r.id,
-                             .deadline_ms = r.deadline_ms,
-                             .wants_reply = r.wants_reply,
-                             .wants_progress = r.wants_progress,
-                             .lease_ms = r.lease_ms,
-                             .every_ms = r.every_ms,
-                             .keep = r.keep,
-                             .adverbs = adverbs,
-                             .body = r.body});
+    p::append_request(text, out);
     return text;
+}
+
+template <class F>
+void for_each_known_adverb(std::string_view line, cles::verb verb, F each) {
+    p::part_reader parts{line};
+    parts.next(); // verb
+    parts.next(); // noun
+    for (auto part = parts.next(); !part.empty(); part = parts.next()) {
+        if (p::adverb found; p::split_adverb(part, found) && p::is_known_adverb(found.key, verb)) {
+            each(found.key);
+        }
+    }
+}
+
+/// Each adverb of the line is also in what was written, unless that means the same without it. So one of which
+/// `written` and `append_request` know nothing is noticed.
+void check_complete(const p::request_line& r, std::string_view line, std::string_view text) {
+    for_each_known_adverb(line, r.verb, [&](std::string_view key) {
+        bool found = (key == "hops" && r.hops == p::default_hops) || (key == "trace" && !r.trace);
+        for_each_known_adverb(text, r.verb, [&](std::string_view other) { found = found || other == key; });
+        require(found, "an adverb is written", text);
+    });
 }
 
 /// A line may end with CR and SP, which are not part of it, and as white space of JSON they may also end a body.
@@ -71,7 +121,14 @@ void check_same(const p::request_line& a, const p::request_line& b, std::string_
     require(a.verb == b.verb && a.noun.target == b.noun.target && a.noun.path == b.noun.path, "verb and noun stay",
             line);
     require(a.id == b.id && a.deadline_ms == b.deadline_ms && a.hops == b.hops && a.via == b.via, "adverbs stay", line);
-    require(a.wants_reply == b.wants_reply && a.wants_progress == b.wants_progress, "wishes stay", line);
+    require(a.from == b.from && a.sig == b.sig, "requester and signature stay", line);
+    require(a.since == b.since && a.describe == b.describe && a.routes.distance == b.routes.distance &&
+                a.routes.by == b.routes.by,
+            "questions stay", line);
+    require(a.grant == b.grant, "a grant stays", line);
+    require(a.wants_reply == b.wants_reply && a.wants_progress == b.wants_progress && a.wants_mark == b.wants_mark,
+            "wishes stay", line);
+    require(a.carried() == b.carried(), "what is carried stays", line);
     require(a.lease_ms == b.lease_ms && a.every_ms == b.every_ms && a.keep == b.keep, "terms of a BIND stay", line);
     require(a.seq == b.seq && a.epoch == b.epoch, "an update stays", line);
     require(without_trailing_space(a.body) == without_trailing_space(b.body), "a body stays", line);
@@ -115,6 +172,7 @@ void run(std::string_view input) {
     require(p::parse_request(again, second, malformed), "what is written can be read", text);
     // Adverbs that do not apply to these verbs are not read, so they are not written for others.
     check_same(request, second, line);
+    check_complete(request, line, again);
 }
 
 } // namespace cles::fuzz

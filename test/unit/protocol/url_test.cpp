@@ -119,4 +119,13 @@ BOOST_AUTO_TEST_CASE(a_unix_path_of_maximum_length_is_valid) {
     BOOST_TEST(cles::parse_url("unix:///" + std::string(106, 'x')).path.size() == 107U);
 }
 
+BOOST_AUTO_TEST_CASE(some_links_stay_on_the_host) {
+    for (const auto* scheme : {"unix", "inproc"}) {
+        BOOST_TEST(cles::stays_on_host(scheme), scheme);
+    }
+    for (const auto* scheme : {"tcp", "tls", "udp", "pool", "other", ""}) {
+        BOOST_TEST(!cles::stays_on_host(scheme), scheme);
+    }
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/membership/peer_table.hpp"
 
+#include <cles/url.hpp>
+
 #include "json/json_members.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
@@ -196,7 +198,7 @@ bool read_entry(std::string_view json, peer_report& out) {
 // loopback address may be that of another host.
 void keep_endpoints_for_others(std::vector<std::string>& endpoints) {
     std::erase_if(endpoints, [](std::string_view url) {
-        return url.starts_with("unix:") || url.find("://0.0.0.0:") != std::string_view::npos ||
+        return stays_on_host(url.substr(0, url.find(':'))) || url.find("://0.0.0.0:") != std::string_view::npos ||
                url.find("://[::]:") != std::string_view::npos;
     });
     std::stable_partition(endpoints.begin(), endpoints.end(), [](std::string_view url) {

@@ -46,7 +46,7 @@ struct place {
 
 int rank_of(const url& where, std::string_view received_from) {
     const int scheme = where.scheme == "tls" || where.scheme == "tcp" ? 0
-                       : where.scheme == "unix"                       ? 1
+                       : stays_on_host(where.scheme)                  ? 1
                        : where.scheme == "udp"                        ? 2
                                                                       : 3;
     return scheme * 2 + (where.host == received_from ? 0 : 1);
@@ -88,7 +88,7 @@ std::optional<place> place_of(std::string_view endpoint, const observed_source& 
     if (!where) {
         return {};
     }
-    if (where->scheme == "unix") {
+    if (stays_on_host(where->scheme)) {
         return from.local ? std::optional{place{std::string{endpoint}, rank_of(*where, from.host)}} : std::nullopt;
     }
     const auto kind = kind_of(where->host);
@@ -129,7 +129,7 @@ std::vector<std::string> endpoints_to_relay(const std::vector<std::string>& anno
             continue;
         }
         const auto kind = kind_of(where->host);
-        if (where->scheme != "unix" && kind != host_kind::none && kind != host_kind::loopback &&
+        if (!stays_on_host(where->scheme) && kind != host_kind::none && kind != host_kind::loopback &&
             put_in_host(*where, from)) {
             result.push_back(to_string(*where));
         }
@@ -149,7 +149,7 @@ observed_source observed_source::at(std::string_view url) {
     if (!where) {
         return {};
     }
-    if (where->scheme == "unix" || where->scheme == "inproc") {
+    if (stays_on_host(where->scheme)) {
         return {"127.0.0.1", true};
     }
     return {where->host, where->host.starts_with("127.") || where->host == "::1"};

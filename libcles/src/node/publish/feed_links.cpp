@@ -205,10 +205,7 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
     const auto now = host_.now();
     const auto asked = c->datagram() == 0 ? std::nullopt : std::optional{now};
     auto request = bind_request(feed, *c);
-    const auto adverbs = e.terms.adverbs + (e.terms.adverbs.empty() ? "mark=yes" : " mark=yes");
-    if (marks != marking::none) {
-        request.adverbs = adverbs;
-    }
+    request.wants_mark = marks != marking::none;
     const auto whole = core::saturating_add(now, time_limit(e.terms.deadline, verb::bind));
     const auto due = std::exchange(e.due, {}).value_or(whole);
     c->bind(feed, request, due > now ? due : whole,

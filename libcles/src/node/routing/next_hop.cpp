@@ -12,6 +12,7 @@
 #include "protocol/grammar.hpp"
 #include "protocol/reply_line.hpp"
 
+#include <algorithm>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -20,14 +21,12 @@
 namespace cles::core {
 namespace {
 
-// A request has at most 16 adverbs, and this node writes up to six: id, deadline, progress, urgent, hops, via.
-constexpr std::size_t max_foreign = protocol::max_adverbs - 6;
-
-void append_foreign(std::string& out, const protocol::request_line& r, std::size_t most) {
+void append_foreign(std::string& out, const protocol::request_line& r) {
+    const auto most = max_further_adverbs(r);
+    auto count = count_adverbs(out);
     protocol::part_reader parts{r.text};
     parts.next(); // verb
     parts.next(); // noun
-    std::size_t count = 0;
     for (auto part = parts.next(); !part.empty() && count < most; part = parts.next()) {
         protocol::adverb a;
         if (protocol::split_adverb(part, a) && !protocol::is_known_adverb(a.key, r.verb)) {
@@ -223,8 +222,24 @@ std::string forwarded_adverbs(const protocol::request_line& r, std::string_view 
     if (!r.sig.empty()) {
         out.append(" sig=").append(r.sig);
     }
-    append_foreign(out, r, max_foreign - (states_requester ? 1 : 0) - (r.sig.empty() ? 0 : 1) - (r.trace ? 1 : 0));
+    append_foreign(out, r);
     return out;
+}
+
+std::size_t count_adverbs(std::string_view adverbs) noexcept {
+    protocol::part_reader parts{adverbs};
+    std::size_t count = 0;
+    while (!parts.next().empty()) {
+        ++count;
+    }
+    return count;
+}
+
+// As many for each verb but BIND, which has more adverbs. docs/protocol.md states how many unknown ones that leaves.
+std::size_t max_further_adverbs(const protocol::request_line& r) noexcept {
+    const auto written = std::max(protocol::max_written_adverbs(r.verb), protocol::max_written_adverbs(verb::delegate));
+    const std::size_t others = 1 + (r.trace ? 0 : 1); // `hops` is a further one here, and `trace` is seldom there
+    return protocol::max_adverbs - (written - others);
 }
 
 } // namespace cles::core

@@ -8,6 +8,7 @@
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -60,5 +61,12 @@ class next_hop {
 /// this node's name, the requester, its signature, and those that this version does not know.
 std::string forwarded_adverbs(const protocol::request_line& request, std::string_view own_name,
                               std::string_view requester = {});
+
+/// How many adverbs are in a text in wire format.
+std::size_t count_adverbs(std::string_view adverbs) noexcept;
+
+/// How many adverbs a request has room for when it is forwarded, besides the members of `outgoing_request`: those of
+/// `forwarded_adverbs`, and what is added to them.
+std::size_t max_further_adverbs(const protocol::request_line& request) noexcept;
 
 } // namespace cles::core

@@ -73,7 +73,7 @@ std::vector<std::string> endpoints_of_interfaces(local_node& host, const std::ve
     std::optional<std::vector<std::string>> hosts; // looked up once, and only if they are needed
     for (const auto& endpoint : host.node().endpoints) {
         auto where = parse_url(endpoint);
-        if (where.scheme == "inproc" || where.scheme == "unix") {
+        if (stays_on_host(where.scheme)) {
             continue;
         }
         if (where.host != "0.0.0.0" && where.host != "::") {

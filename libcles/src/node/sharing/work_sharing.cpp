@@ -75,8 +75,7 @@ std::unique_ptr<const movable_request> work_sharing::movable(const protocol::req
     auto last = r;
     last.hops = 1; // so that it is forwarded with `hops=0`
     auto adverbs = forwarded_adverbs(last, node_.name, requester);
-    constexpr std::ptrdiff_t others = 5; // id, deadline, progress, urgent, grant
-    if (std::count(adverbs.begin(), adverbs.end(), ' ') + 1 + others > std::ptrdiff_t{protocol::max_adverbs}) {
+    if (count_adverbs(adverbs) == max_further_adverbs(last)) { // no room for `grant`
         return nullptr;
     }
     std::string scratch;

@@ -186,6 +186,22 @@ BOOST_AUTO_TEST_CASE(a_request_without_room_for_another_adverb_stays) {
     BOOST_TEST(sent().text == "DELEGATE car2:work/2 hops=0 via=car1" + adverbs(9) + " grant=00000000000000aa {}");
 }
 
+// The other node would refuse it.
+BOOST_AUTO_TEST_CASE(a_job_never_has_too_many_adverbs) {
+    std::string unknown;
+    for (char c = 'a'; c < 'a' + 9; ++c) {
+        unknown += std::string{" x"} + c + "=1";
+        submit("DELEGATE car1:work id=" + std::to_string(c) +
+               " progress=yes urgent=yes trace=00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-01" + unknown);
+    }
+    grant(9);
+    BOOST_TEST(queue.moved.size() == 8U);
+    cles::protocol::request_line r;
+    cles::protocol::malformed_request wrong;
+    const auto line = std::string_view{sent().line}.substr(0, sent().line.size() - 1);
+    BOOST_TEST(cles::protocol::parse_request(line, r, wrong), wrong.why << " in " << line);
+}
+
 BOOST_AUTO_TEST_CASE(a_long_request_stays) {
     submit("DELEGATE car1:work id=1 {\"x\":\"" + std::string(1'000'000, 'x') + "\"}");
     BOOST_TEST(queue.waiting.at(0).call->movable() == nullptr);
