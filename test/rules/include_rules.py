@@ -102,9 +102,7 @@ WITHOUT_IO = {
     "libcles/src/security/core_dumps.cpp": {"sys/prctl.h", "sys/resource.h"},  # limits of the process
     # Files of keys and plugins; each is checked after it has been opened.
     "libcles/src/security/fleet/checked_file.cpp": {"fcntl.h", "sys/stat.h", "sys/xattr.h", "unistd.h"},
-    "libcles/src/security/fleet/descriptor.cpp": {"sys/stat.h", "unistd.h"},
     "libcles/src/security/fleet/file_protection.cpp": {"sys/stat.h", "unistd.h"},
-    "libcles/src/security/fleet/private_group.cpp": {"sys/stat.h"},
     "libcles/src/security/fleet/protected_folder.cpp": {"fcntl.h", "sys/file.h", "sys/stat.h", "unistd.h"},
     "libcles/src/security/keys/secret.cpp": {"mutex"},  # any thread may destroy a secret
 }

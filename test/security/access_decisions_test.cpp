@@ -80,7 +80,7 @@ struct kept_noun {
 access_decision decide(const access_policy& policy, std::string_view direction, std::string_view requester,
                        std::string_view forwarder, verb asked, const decoded_noun& noun) {
     return direction == "received"    ? policy.received(requester, forwarder, asked, noun)
-           : direction == "delivered" ? policy.delivered(requester, forwarder, noun)
+           : direction == "delivered" ? policy.received(requester, forwarder, verb::bind, noun)
                                       : policy.sent(forwarder, asked, noun);
 }
 
@@ -169,8 +169,8 @@ BOOST_AUTO_TEST_CASE(rules_do_not_permit_what_the_roster_does_not) {
 BOOST_AUTO_TEST_CASE(updates_count_as_bind) {
     const auto policy =
         policy_of({limited("car1", {}, texts{"bind *:target", "update *:log"}), limited("car2", {}, {})});
-    BOOST_TEST(policy.delivered("car2", "", kept_noun{"car1:target"}.decoded).allowed());
-    BOOST_TEST(!policy.delivered("car2", "", kept_noun{"car1:log"}.decoded).allowed());
+    BOOST_TEST(policy.received("car2", "", verb::bind, kept_noun{"car1:target"}.decoded).allowed());
+    BOOST_TEST(!policy.received("car2", "", verb::bind, kept_noun{"car1:log"}.decoded).allowed());
     // An UPDATE that asks a node to publish is a request like others.
     BOOST_TEST(policy.received("car2", "", verb::update, kept_noun{"car1:log"}.decoded).allowed());
     BOOST_TEST(!policy.received("car2", "", verb::update, kept_noun{"car1:target"}.decoded).allowed());

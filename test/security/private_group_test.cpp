@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/fleet/private_group.hpp"
+#include "security/fleet/file_protection.hpp"
 
 #include <boost/test/unit_test.hpp>
 

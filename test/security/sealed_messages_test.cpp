@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/child_process.hpp"
-#include "security/keys/byte_text.hpp"
+#include "security/keys/bytes.hpp"
 #include "security/messages/sealed_messages.hpp"
 #include "security/sealed_network.hpp"
 

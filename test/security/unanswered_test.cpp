@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/datagrams/unanswered.hpp"
+#include "security/datagrams/datagram_peer.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -82,6 +82,7 @@ class json_reader {
     bool literal(std::string_view word);
     bool scan_number(std::string_view& out, bool& integral);
     bool scan_string(std::string_view& out, std::string& decoded);
+    bool scan_key(std::string_view& out, std::string& decoded);
     template <class Integer>
     bool read_integer(Integer& out, std::string_view out_of_range);
     bool skip_value(std::size_t depth);

@@ -2,17 +2,21 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
-#include <memory>
 #include <string>
 
 /// Security for services (docs/security.md). Link the CMake target cles::tls.
 
 namespace cles {
 
-namespace detail {
-class security_part;
-}
+namespace asio_port {
+class asio_environment;
+} // namespace asio_port
+
+namespace core {
+struct node_options;
+} // namespace core
 
 struct security_options {
     /// The node's directory: its key, the roster of its fleet, and local rules. `cles keys new` and `cles fleet` make
@@ -36,7 +40,7 @@ struct security_options {
 /// what the roster and the local rules permit; changes of both take effect without a restart.
 ///
 /// \throws cles::error with `denied` if the files cannot be used; the message names the file and what mends it
-std::shared_ptr<detail::security_part> secured(security_options options);
-std::shared_ptr<detail::security_part> secured(const std::string& directory);
+std::function<void(asio_port::asio_environment&, core::node_options&)> secured(security_options options);
+std::function<void(asio_port::asio_environment&, core::node_options&)> secured(const std::string& directory);
 
 } // namespace cles

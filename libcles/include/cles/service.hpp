@@ -61,7 +61,6 @@ struct node_options;
 } // namespace core
 
 namespace detail {
-class security_part;
 /// Adds to a service's environment and to the settings of its node. As a function, it adds less to programs without one
 /// than an object would.
 using service_part = std::function<void(asio_port::asio_environment&, core::node_options&)>;
@@ -76,7 +75,7 @@ struct service_options {
     bool insecure = false;                      ///< allow listening beyond this host without credentials
     /// `cles::secured(directory)` authenticates all peers and encrypts what is sent to other hosts
     /// (<cles/security.hpp>, docs/security.md). Each service needs its own.
-    std::shared_ptr<detail::security_part> security{};
+    detail::service_part security{};
     /// Networks ("10.0.0.0/8", "fd00::/8") whose source addresses are trusted, so the amount sent to them by UDP is not
     /// limited. All other hosts except loopback are sent less than 64 KiB a second, so that the node cannot be used to
     /// flood a third party.
@@ -533,6 +532,9 @@ class service : public registrar {
     /// the service has made a strand, because the caller is not on it.
     [[nodiscard]] bool hops(bool elsewhere) const noexcept { return elsewhere || (pooled_ && !on_strand()); }
     [[nodiscard]] bool on_strand() const noexcept;
+    /// Runs it on the strand that was made of a pool, and waits for it; inline if there is none.
+    template <class F>
+    std::invoke_result_t<F> run_inside(F f) const;
 
     friend detail::awaited_request;
     friend detail::sharing_access;

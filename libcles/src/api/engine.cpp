@@ -4,7 +4,6 @@
 #include <cles/reply_operation.hpp>
 #include <cles/responder.hpp>
 
-#include "api/security_part.hpp"
 #include "node/session/call.hpp"
 #include "transport/member_handler.hpp"
 
@@ -44,7 +43,7 @@ core::local_node_options options_of(service_options&& all, asio_port::asio_envir
                                     .on_name_taken = std::move(all.on_name_taken),
                                     .routing = all.routing};
     if (all.security) {
-        all.security->equip(by, result.node);
+        all.security(by, result.node);
     }
     if (all.federation) {
         all.federation(by, result.node);

@@ -27,6 +27,13 @@ std::uint32_t seed() {
     return static_cast<std::uint32_t>(draw());
 }
 
+void fail_next(const asio::any_io_executor& executor, event_ptr operation, boost::system::error_code code,
+               std::string why) {
+    asio::post(executor, [operation = std::move(operation), code, why = std::move(why)]() mutable {
+        operation.release()->fail(code, why);
+    });
+}
+
 /// A feed whose `start` fails with this reason.
 class refused_feed final : public feed_control {
   public:
@@ -34,11 +41,7 @@ class refused_feed final : public feed_control {
         : host_(std::move(host)), code_(code), message_(std::move(message)) {}
 
     void start(pending_ptr bound) override { host_->fail_later(std::move(bound), code_, message_); }
-    void next(event_ptr operation) override {
-        asio::post(host_->executor(), [operation = std::move(operation), code = code_, message = message_]() mutable {
-            operation.release()->fail(code, message);
-        });
-    }
+    void next(event_ptr operation) override { fail_next(host_->executor(), std::move(operation), code_, message_); }
     void cancel_start() override {}
     void cancel(const pending_event*) override {}
     void close() override {}
@@ -67,12 +70,10 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
     [[nodiscard]] virtual bool is_starting() const = 0;
     /// One call of `async_next`: completes with the next event or an error, never inside this call.
     void fetch(core::feed_mailbox& from, event_ptr operation) {
-        if (from.closed() || from.has_waiter()) {
-            const auto code = make_error_code(from.closed() ? errc::stopped : errc::busy);
-            asio::post(executor(), [operation = std::move(operation), code]() mutable {
-                operation.release()->fail(code, code == errc::busy ? "another async_next of this feed is pending"
-                                                                   : "the feed is closed");
-            });
+        if (from.closed()) {
+            fail_next(executor(), std::move(operation), errc::stopped, "the feed is closed");
+        } else if (from.has_waiter()) {
+            fail_next(executor(), std::move(operation), errc::busy, "another async_next of this feed is pending");
         } else if (from.next(std::move(operation))) {
             asio::post(executor(), [&from, self = shared_from_this()] { from.pump(); });
         }

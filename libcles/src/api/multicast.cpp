@@ -8,16 +8,13 @@
 #include <boost/asio/ip/address_v4.hpp>
 
 #include <algorithm>
-#include <charconv>
 
 namespace cles {
 namespace {
 
 std::uint16_t port_of(std::string_view digits, std::string_view whole) {
     std::uint16_t port = 0;
-    const auto* end = digits.data() + digits.size();
-    const auto [rest, code] = std::from_chars(digits.data(), end, port);
-    if (code != std::errc{} || rest != end || port == 0) {
+    if (!json_detail::read_number(digits, port) || port == 0) {
         throw error(errc::invalid_url,
                     "'" + std::string{digits} + "' in '" + std::string{whole} + "' is not a port from 1 to 65535");
     }

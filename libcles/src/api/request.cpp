@@ -2,8 +2,7 @@
 #include <cles/owned_request.hpp>
 #include <cles/request.hpp>
 
-#include <charconv>
-#include <system_error>
+#include "json/json_scan.hpp"
 
 namespace cles {
 namespace detail {
@@ -66,9 +65,7 @@ std::shared_ptr<const request_data> own(const request_data& data) {
 
 template <class T>
 bool read_number(std::string_view text, T& number) noexcept {
-    const auto* const end = text.data() + text.size();
-    const auto [stop, code] = std::from_chars(text.data(), end, number);
-    return code == std::errc{} && stop == end;
+    return json_detail::read_number(text, number);
 }
 template bool read_number(std::string_view, char&) noexcept;
 template bool read_number(std::string_view, signed char&) noexcept;

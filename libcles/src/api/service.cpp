@@ -43,22 +43,6 @@ using strand = asio::strand<asio::any_io_executor>;
     done.get();
 }
 
-// The same; inline if there is no such strand.
-template <class F>
-std::invoke_result_t<F> run_on(const strand* own, F f) {
-    using result_type = std::invoke_result_t<F>;
-    if (own == nullptr || own->running_in_this_thread()) {
-        return f();
-    }
-    if constexpr (std::is_void_v<result_type>) {
-        run_and_wait(*own, std::ref(f));
-    } else {
-        std::optional<result_type> result;
-        run_and_wait(*own, [&] { result.emplace(f()); });
-        return *std::move(result);
-    }
-}
-
 // The same on a strand that is not used yet: inline if called on a thread of the pool.
 [[gnu::cold]] void begin_on(const strand* own, std::function<void()> f) {
     if (own == nullptr) {
@@ -119,6 +103,22 @@ template void slot_ref::assign_slot<asio::cancellation_slot>(void* slot, withdra
 
 } // namespace detail
 
+template <class F>
+std::invoke_result_t<F> service::run_inside(F f) const {
+    using result_type = std::invoke_result_t<F>;
+    if (on_strand()) {
+        return f();
+    }
+    const auto& own = *strand_of(pooled_, get_executor());
+    if constexpr (std::is_void_v<result_type>) {
+        run_and_wait(own, std::ref(f));
+    } else {
+        std::optional<result_type> result;
+        run_and_wait(own, [&] { result.emplace(f()); });
+        return *std::move(result);
+    }
+}
+
 service::service(asio::any_io_executor executor, const service_options& options)
     : pooled_(executor.target<asio::thread_pool::executor_type>() != nullptr) {
     engine_ = std::make_shared<detail::engine>(one_at_a_time(std::move(executor)), options);
@@ -143,7 +143,7 @@ bool service::on_strand() const noexcept {
 }
 
 std::vector<std::string> service::endpoints() const {
-    return run_on(strand_of(pooled_, get_executor()), [this] { return engine_->node().endpoints; });
+    return run_inside([this] { return engine_->node().endpoints; });
 }
 
 const asio::any_io_executor& service::get_executor() const noexcept { return engine_->executor(); }
@@ -151,51 +151,49 @@ const asio::any_io_executor& service::get_executor() const noexcept { return eng
 // User functions that these call (log, load) may destroy the service.
 
 std::string service::listen(std::string_view url) {
-    return run_on(strand_of(pooled_, get_executor()), [inside = engine_, url] { return inside->listen(url); });
+    return run_inside([inside = engine_, url] { return inside->listen(url); });
 }
 
 void service::set_peer(std::string_view name, std::string_view url) {
-    run_on(strand_of(pooled_, get_executor()),
-           [inside = engine_, name, url] { inside->peer_channels().set_peer(name, url); });
+    run_inside([inside = engine_, name, url] { inside->peer_channels().set_peer(name, url); });
 }
 
 void service::leave() {
-    run_on(strand_of(pooled_, get_executor()), [inside = engine_] { inside->discovery().leave(); });
+    run_inside([inside = engine_] { inside->discovery().leave(); });
 }
 
 void service::set_gossip(const gossip_options& how) {
-    run_on(strand_of(pooled_, get_executor()), [inside = engine_, &how] { inside->discovery().gossip(how); });
+    run_inside([inside = engine_, &how] { inside->discovery().gossip(how); });
 }
 
 std::vector<peer> service::peers() const {
-    return run_on(strand_of(pooled_, get_executor()), [this] { return engine_->node().list_peers(engine_->now()); });
+    return run_inside([this] { return engine_->node().list_peers(engine_->now()); });
 }
 
 void service::stop() { engine_->stop(); }
 
 void service::add(registration task) {
-    run_on(strand_of(pooled_, get_executor()), [this, &task] { engine_->add(std::move(task)); });
+    run_inside([this, &task] { engine_->add(std::move(task)); });
 }
 
 bool service::remove(cles::verb verb, std::string_view task) {
-    return run_on(strand_of(pooled_, get_executor()), [this, verb, task] { return engine_->remove(verb, task); });
+    return run_inside([this, verb, task] { return engine_->remove(verb, task); });
 }
 
 publisher service::make_publisher() {
-    return run_on(strand_of(pooled_, get_executor()), [this] { return publisher{engine_->cross_thread_updates()}; });
+    return run_inside([this] { return publisher{engine_->cross_thread_updates()}; });
 }
 
 void service::publish(std::string_view noun, const std::function<void(json_writer&)>& write) {
-    run_on(strand_of(pooled_, get_executor()), [&, inside = engine_] { inside->publish(noun, write); });
+    run_inside([&, inside = engine_] { inside->publish(noun, write); });
 }
 
 bool service::retire(std::string_view noun) {
-    return run_on(strand_of(pooled_, get_executor()), [this, noun] { return engine_->node().published.retire(noun); });
+    return run_inside([this, noun] { return engine_->node().published.retire(noun); });
 }
 
 std::size_t service::retire_all(std::string_view task) {
-    return run_on(strand_of(pooled_, get_executor()),
-                  [this, task] { return engine_->node().published.retire_all(task); });
+    return run_inside([this, task] { return engine_->node().published.retire_all(task); });
 }
 
 template <class Start>

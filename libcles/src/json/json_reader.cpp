@@ -123,14 +123,14 @@ bool json_reader::next(char close) {
     return true;
 }
 
-bool json_reader::next_key(std::string_view& key) {
-    if (!next('}')) {
-        return false;
-    }
+bool json_reader::next_key(std::string_view& key) { return next('}') && scan_key(key, scratch_); }
+
+// A member's name, and the colon after it.
+bool json_reader::scan_key(std::string_view& out, std::string& decoded) {
     if (look() != '"') {
         return expected("a member's name");
     }
-    if (!scan_string(key, scratch_)) {
+    if (!scan_string(out, decoded)) {
         return false;
     }
     if (look() != ':') {
@@ -213,9 +213,7 @@ bool json_reader::read_integer(Integer& out, std::string_view out_of_range) {
     if (!require(kind::number) || !scan_number(digits, integral)) {
         return false;
     }
-    const auto end = digits.data() + digits.size();
-    const auto [ptr, code] = std::from_chars(digits.data(), end, out);
-    return (code == std::errc{} && ptr == end) || fail(integral ? out_of_range : "expected an integer");
+    return json_detail::read_number(digits, out) || fail(integral ? out_of_range : "expected an integer");
 }
 
 bool json_reader::read(std::int64_t& out) { return read_integer(out, "an integer out of range"); }
@@ -285,19 +283,7 @@ bool json_reader::skip_values(char close, std::size_t depth) {
     std::string_view key;
     std::string decoded;
     for (;;) {
-        if (close == '}') {
-            if (look() != '"') {
-                return expected("a member's name");
-            }
-            if (!scan_string(key, decoded)) {
-                return false;
-            }
-            if (look() != ':') {
-                return expected("':'");
-            }
-            ++at_;
-        }
-        if (!skip_value(depth)) {
+        if ((close == '}' && !scan_key(key, decoded)) || !skip_value(depth)) {
             return false;
         }
         const auto c = look();

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 /// The characters and tokens of JSON (RFC 8259, sections 6 and 7). The scanners start at `at` and leave it after the
 /// token, or return what is wrong there; an empty result is success.
@@ -54,6 +55,14 @@ void append_number(std::string& out, Number n) {
     std::array<char, 32> digits;
     const auto* const end = std::to_chars(digits.data(), digits.data() + digits.size(), n).ptr;
     out.append(digits.data(), static_cast<std::size_t>(end - digits.data()));
+}
+
+/// Reads a number that is the whole text, as `std::from_chars` does.
+template <class Number>
+bool read_number(std::string_view text, Number& n) noexcept {
+    const auto* const end = text.data() + text.size();
+    const auto [rest, code] = std::from_chars(text.data(), end, n);
+    return code == std::errc{} && rest == end;
 }
 
 std::string_view scan_number(std::string_view text, std::size_t& at, bool& integral) noexcept;

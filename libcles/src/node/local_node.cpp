@@ -5,7 +5,6 @@
 #include <cles/json_reader.hpp>
 #include <cles/limit_ranges.hpp>
 
-#include "node/base/completion_drain.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/routing/other_pools.hpp"
 #include "node/session/request_checks.hpp"

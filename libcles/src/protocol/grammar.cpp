@@ -76,9 +76,7 @@ bool is_number(std::string_view text) noexcept {
 
 std::optional<std::uint64_t> parse_number(std::string_view text) noexcept {
     std::uint64_t value = 0;
-    const auto end = text.data() + text.size();
-    const auto [ptr, code] = std::from_chars(text.data(), end, value);
-    if (text.empty() || code != std::errc{} || ptr != end || (text.size() > 1 && text.front() == '0')) {
+    if (!json_detail::read_number(text, value) || (text.size() > 1 && text.front() == '0')) {
         return std::nullopt;
     }
     return value;

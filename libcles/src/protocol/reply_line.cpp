@@ -7,8 +7,6 @@
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
 
-#include <charconv>
-
 namespace cles::protocol {
 
 bool begins_with_error(std::string_view body) {
@@ -47,9 +45,7 @@ bool parse_reply(std::string_view line, reply_line& out) noexcept {
             out.grant = parse_grant(a.value).value_or(0);
         } else if (a.key == "progress") {
             double fraction = -1;
-            const auto end = a.value.data() + a.value.size();
-            const auto [ptr, code] = std::from_chars(a.value.data(), end, fraction);
-            if (out.progress || code != std::errc{} || ptr != end || !(fraction >= 0 && fraction <= 1)) {
+            if (out.progress || !json_detail::read_number(a.value, fraction) || !(fraction >= 0 && fraction <= 1)) {
                 return false;
             }
             out.progress = fraction;

@@ -3,7 +3,6 @@
 
 #include <cles/error.hpp>
 
-#include "security/access/rules_file.hpp"
 #include "security/datagrams/sealed_group_port.hpp"
 #include "security/keys/signed_text.hpp"
 #include "security/messages/sealed_messages.hpp"

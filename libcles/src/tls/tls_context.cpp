@@ -9,7 +9,6 @@
 #include <openssl/x509.h>
 
 #include <array>
-#include <cstdint>
 #include <string>
 #include <string_view>
 

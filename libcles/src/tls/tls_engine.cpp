@@ -77,8 +77,9 @@ struct engine_bio {
     }
 
     static void on_message(int sent, int, int type, const void*, std::size_t, SSL*, void* engine) {
-        if (sent == 0 && type == SSL3_RT_HANDSHAKE) {
-            static_cast<tls_engine*>(engine)->count_handshake_message();
+        auto& of = *static_cast<tls_engine*>(engine);
+        if (sent == 0 && type == SSL3_RT_HANDSHAKE && of.established_) {
+            ++of.handshake_messages_;
         }
     }
 };
@@ -151,12 +152,6 @@ bool tls_engine::note_peer_key() {
     std::size_t size = peer_key_.size();
     return key != nullptr && ::EVP_PKEY_get_id(key) == EVP_PKEY_ED25519 &&
            ::EVP_PKEY_get_raw_public_key(key, peer_key_.data(), &size) == 1 && size == peer_key_.size();
-}
-
-void tls_engine::count_handshake_message() noexcept {
-    if (established_) {
-        ++handshake_messages_;
-    }
 }
 
 tls_engine::status tls_engine::read(std::span<char> space, std::size_t& count, boost::system::error_code& why) {

@@ -3,6 +3,7 @@
 
 #include "security/keys/keys.hpp"
 #include "tls/tls_context.hpp"
+#include "transport/stream_codec.hpp"
 
 #include <boost/system/error_code.hpp>
 
@@ -22,12 +23,8 @@ namespace cles::tls {
 class tls_engine {
   public:
     enum class role : std::uint8_t { client, server };
-    enum class status : std::uint8_t {
-        done,
-        need_input,
-        ended,  ///< the peer has said that it sends no more
-        failed, ///< there may be an alert to send
-    };
+    /// `ended`: the peer has said that it sends no more. After `failed`, there may be an alert to send.
+    using status = transport::stream_codec::status;
 
     /// \throws security::security_error if there is no memory
     tls_engine(const tls_context& shared, role as);
@@ -61,7 +58,6 @@ class tls_engine {
 
     status status_of(int result, boost::system::error_code& why);
     [[nodiscard]] bool note_peer_key();
-    void count_handshake_message() noexcept;
 
     struct free_ssl {
         void operator()(ssl_st* ssl) const noexcept;

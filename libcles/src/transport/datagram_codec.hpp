@@ -3,6 +3,7 @@
 
 #include <cles/limits.hpp>
 
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <boost/container_hash/hash.hpp>
 #include <boost/system/error_code.hpp>
@@ -27,12 +28,7 @@ struct datagram_origin {
         std::size_t operator()(const datagram_origin& o) const noexcept {
             std::size_t seed = o.at.port();
             boost::hash_combine(seed, o.member);
-            if (o.at.address().is_v4()) {
-                boost::hash_combine(seed, o.at.address().to_v4().to_uint());
-            } else {
-                const auto bytes = o.at.address().to_v6().to_bytes();
-                boost::hash_combine(seed, std::string_view{reinterpret_cast<const char*>(bytes.data()), bytes.size()});
-            }
+            boost::hash_combine(seed, std::hash<boost::asio::ip::address>{}(o.at.address()));
             return seed;
         }
     };

@@ -9,7 +9,6 @@
 #include <boost/system/system_error.hpp>
 
 #include <cerrno>
-#include <string>
 #include <utility>
 
 #include <netinet/in.h>

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -66,5 +67,8 @@ class stream_codec {
     /// Frees unused memory. Invalidates prepared space.
     virtual void shrink() = 0;
 };
+
+/// Makes the codec of a connection; empty for links without one.
+using codec_maker = std::function<std::unique_ptr<stream_codec>()>;
 
 } // namespace cles::transport

@@ -5,6 +5,7 @@
 
 #include <boost/asio/error.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -104,13 +105,10 @@ namespace {
 // lack of descriptors, would recur at once.
 bool is_the_peers(const error_code& code) {
     using namespace boost::system::errc;
-    for (const auto one : {connection_aborted, connection_reset, protocol_error, no_protocol_option, host_unreachable,
-                           network_unreachable, network_down, operation_not_supported, timed_out, interrupted}) {
-        if (code == one) {
-            return true;
-        }
-    }
-    return false;
+    const auto all = {connection_aborted, connection_reset,    protocol_error, no_protocol_option,
+                      host_unreachable,   network_unreachable, network_down,   operation_not_supported,
+                      timed_out,          interrupted};
+    return std::ranges::any_of(all, [&](errc_t one) { return code == one; });
 }
 
 } // namespace

@@ -25,9 +25,6 @@ using listening_socket = boost::asio::basic_socket_acceptor<boost::asio::generic
 /// Prepares a connected socket and returns the identity of its peer.
 using identify_function = std::function<identity(stream_socket&)>;
 
-/// Makes the codec of a connection; empty for links without one.
-using codec_maker = std::function<std::unique_ptr<stream_codec>()>;
-
 /// Makes one connection, to the first of several endpoints that accepts it, within `limits::connect` in all since this
 /// was created.
 class stream_dialler : public std::enable_shared_from_this<stream_dialler> {

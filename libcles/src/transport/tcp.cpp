@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "transport/tcp.hpp"
-
 #include "transport/ip_host.hpp"
 #include "transport/stream_endpoint.hpp"
 #include "transport/transports.hpp"

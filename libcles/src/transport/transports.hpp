@@ -3,7 +3,10 @@
 
 #include <cles/link.hpp>
 
+#include "transport/stream_codec.hpp"
+
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -15,6 +18,19 @@ inline constexpr int lines_per_turn = 1024;
 
 /// The names of nodes as which users connect, by user id.
 using user_names = std::map<std::uint32_t, std::string>;
+
+/// `tcp://host:port`. Nagle's algorithm is off, keep-alive on. A host name at which to listen is looked up by a call
+/// that may block.
+std::unique_ptr<link_transport> make_tcp();
+
+/// Listens by TCP, for links of the URL's scheme. A host name is looked up by a call that may block.
+/// \throws boost::system::system_error
+std::unique_ptr<acceptor> listen_tcp(const boost::asio::any_io_executor& executor, const url& where,
+                                     const limits& bounds, codec_maker make_codec = nullptr);
+
+/// Dials by TCP; see `link_transport::dial`.
+std::function<void()> dial_tcp(const boost::asio::any_io_executor& executor, const url& where, const limits& bounds,
+                               dial_callback done, codec_maker make_codec = nullptr);
 
 /// `unix:///path` (a socket file; one on which nothing listens any more is replaced) and `unix://@name` (abstract). The
 /// kernel reports the peer's user id; a user in `users` has that name. A file is for its owner only, unless `users` has
@@ -32,9 +48,5 @@ std::unique_ptr<acceptor> handle_of(std::shared_ptr<acceptor> shared);
 
 /// Whether a service of this process listens at that name.
 bool is_open(const std::string& name);
-
-/// `tcp://host:port`. Nagle's algorithm is off, keep-alive on. A host name at which to listen is looked up by a call
-/// that may block.
-std::unique_ptr<link_transport> make_tcp();
 
 } // namespace cles::transport

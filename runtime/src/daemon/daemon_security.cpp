@@ -42,9 +42,9 @@ std::optional<std::uint32_t> id_of_user(const std::string& user) {
 
 } // namespace
 
-std::shared_ptr<detail::security_part> security_of(const config& setup) {
+detail::service_part security_of(const config& setup) {
     if (!setup.security.is_on()) {
-        return nullptr;
+        return {};
     }
     security::forbid_core_dumps();
     security_options options{.directory = setup.security.keys};
@@ -83,11 +83,11 @@ std::string name_of_key(const std::string& directory) {
 
 namespace cles::runtime {
 
-std::shared_ptr<detail::security_part> security_of(const config& setup) {
+detail::service_part security_of(const config& setup) {
     if (setup.security.is_on()) {
         throw config_error(setup.location_of("security"), "this clesd was built without security");
     }
-    return nullptr;
+    return {};
 }
 
 std::string name_of_key(const std::string& /*directory*/) { return {}; }

@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <memory>
-#include <string>
+#include <cles/service.hpp>
 
-namespace cles::detail {
-class security_part;
-}
+#include <string>
 
 namespace cles::runtime {
 
 struct config;
 
-/// The security that the configuration asks for; null if it is off. \throws config_error if its files cannot be used,
+/// The security that the configuration asks for; empty if it is off. \throws config_error if its files cannot be used,
 /// the key is that of another node, a user is unknown, or this program was built without security
-std::shared_ptr<detail::security_part> security_of(const config& setup);
+detail::service_part security_of(const config& setup);
 
 /// The name of the key in this directory; empty if it cannot be read.
 std::string name_of_key(const std::string& directory);

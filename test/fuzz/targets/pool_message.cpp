@@ -19,7 +19,7 @@
 #include "fuzz/fuzz.hpp"
 #include "fuzz/seeded_keys.hpp"
 #include "security/fleet/fleet_authority.hpp"
-#include "security/keys/byte_text.hpp"
+#include "security/keys/bytes.hpp"
 #include "security/messages/sealed_messages.hpp"
 
 #include <algorithm>

@@ -22,7 +22,7 @@
 #include "security/datagrams/group_receiver.hpp"
 #include "security/datagrams/group_sender.hpp"
 #include "security/hex.hpp"
-#include "security/keys/byte_text.hpp"
+#include "security/keys/bytes.hpp"
 #include "security/messages/sealed_messages.hpp"
 
 #include <algorithm>

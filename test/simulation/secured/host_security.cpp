@@ -4,7 +4,7 @@
 #include "node/secured/secured_protocol.hpp"
 #include "protocol/request_line.hpp"
 #include "simulation/network/group_port.hpp"
-#include "tls/udp_codec.hpp"
+#include "tls/sealed_udp.hpp"
 
 #include <functional>
 #include <utility>

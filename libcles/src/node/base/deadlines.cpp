@@ -3,8 +3,6 @@
 
 #include "port/environment.hpp"
 
-#include <utility>
-
 namespace cles::core {
 
 deadline::~deadline() {

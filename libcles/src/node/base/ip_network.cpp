@@ -3,10 +3,10 @@
 
 #include <cles/error.hpp>
 
+#include "json/json_scan.hpp"
+
 #include <algorithm>
-#include <charconv>
 #include <cstddef>
-#include <system_error>
 
 #include <arpa/inet.h>
 
@@ -33,9 +33,7 @@ std::optional<unsigned> parse_bits(std::string_view text, unsigned most) noexcep
         return {};
     }
     unsigned bits = 0;
-    const auto* const end = text.data() + text.size();
-    const auto [rest, code] = std::from_chars(text.data(), end, bits);
-    return code == std::errc{} && rest == end && bits <= most ? std::optional{bits} : std::nullopt;
+    return json_detail::read_number(text, bits) && bits <= most ? std::optional{bits} : std::nullopt;
 }
 
 } // namespace

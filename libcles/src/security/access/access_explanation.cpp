@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/access/access_explanation.hpp"
+#include <cles/security/access.hpp>
 
-#include "security/access/rules_file.hpp"
+#include "security/access/access_policy.hpp"
 #include "security/fleet/key_directory.hpp"
 
 #include <algorithm>
-#include <memory>
 #include <optional>
 #include <utility>
 
@@ -14,6 +13,14 @@ namespace {
 
 using cause = access_decision::cause;
 using listed_rights = std::optional<std::vector<std::string>>;
+
+/// Something that was decided by a policy.
+struct decided_access {
+    std::string_view requester{};
+    std::string_view forwarder{}; ///< empty for none
+    std::string_view target{};
+    access_decision made{};
+};
 
 std::string reason_of(cause by) {
     switch (by) {
@@ -31,7 +38,7 @@ std::string reason_of(cause by) {
     return {};
 }
 
-/// Writes the lines of one answer.
+/// What decides it, for people.
 class explanation {
   public:
     explanation(const access_policy& policy, const decided_access& decided) : policy_(policy), decided_(decided) {
@@ -124,21 +131,11 @@ class explanation {
     access_answer out_;
 };
 
-// The name of the node whose directory it is; empty for that of an authority.
-std::string own_name_in(const key_directory& directory) {
-    const auto key = directory.folder().read_secret("key", 1024);
-    return key ? directory.read_key().name : std::string{};
-}
-
 } // namespace
-
-access_answer explain(const access_policy& policy, const decided_access& decided) {
-    return explanation{policy, decided}.run();
-}
 
 access_answer explain_access(const std::string& directory, const access_question& question) {
     const key_directory files{directory};
-    const auto own_name = own_name_in(files);
+    const auto own_name = files.has_key() ? files.read_key().name : std::string{}; // an authority has none
     std::vector<std::string> warnings;
     const auto newest = files.read_newest_roster(warnings);
     if (!newest) {
@@ -162,7 +159,8 @@ access_answer explain_access(const std::string& directory, const access_question
     const bool is_own = !own_name.empty() && question.requester == own_name && target != own_name;
     const auto made = is_own ? policy.sent(question.forwarder, question.asked, noun)
                              : policy.received(question.requester, question.forwarder, question.asked, noun);
-    auto out = explain(policy, {question.requester, question.forwarder, target, made});
+    const decided_access decided{question.requester, question.forwarder, target, made};
+    auto out = explanation{policy, decided}.run();
     out.warnings = std::move(warnings);
     return out;
 }

@@ -48,11 +48,6 @@ access_decision access_policy::received(std::string_view requester, std::string_
     return decide(requester, forwarder, asked, noun, false);
 }
 
-access_decision access_policy::delivered(std::string_view subscriber, std::string_view forwarder,
-                                         const decoded_noun& noun) const noexcept {
-    return decide(subscriber, forwarder, verb::bind, noun, false);
-}
-
 access_decision access_policy::sent(std::string_view forwarder, verb asked, const decoded_noun& noun) const noexcept {
     return decide(own_name_, forwarder, asked, noun, true);
 }

@@ -50,12 +50,10 @@ class access_policy {
     access_policy(std::string own_name, std::shared_ptr<const std::vector<member>> members, local_rules rules);
     access_policy(std::string own_name, const std::shared_ptr<const roster>& in_force, local_rules rules);
 
-    /// A request that has arrived here, to be executed or forwarded.
+    /// A request that has arrived here, to be executed or forwarded. Also an update that would be delivered, to a
+    /// subscriber on a link or to one behind the node that forwards: then the verb is BIND.
     [[nodiscard]] access_decision received(std::string_view requester, std::string_view forwarder, verb asked,
                                            const decoded_noun& noun) const noexcept;
-    /// An update that would be delivered, to a subscriber on a link or to one behind the node that forwards.
-    [[nodiscard]] access_decision delivered(std::string_view subscriber, std::string_view forwarder,
-                                            const decoded_noun& noun) const noexcept;
     /// A request of this node itself, before it is sent. Also an update for it: then the verb is BIND.
     [[nodiscard]] access_decision sent(std::string_view forwarder, verb asked, const decoded_noun& noun) const noexcept;
 

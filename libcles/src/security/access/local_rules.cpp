@@ -2,6 +2,7 @@
 #include "security/access/local_rules.hpp"
 
 #include "security/access/wildcard.hpp"
+#include "security/keys/keys.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -123,6 +124,13 @@ const local_rules::rule* local_rules::find(std::string_view requester, verb aske
     };
     const auto found = std::find_if(rules_.begin(), rules_.end(), matches);
     return found == rules_.end() ? nullptr : &*found;
+}
+
+local_rules read_local_rules(const protected_folder& folder) try {
+    const auto content = folder.read_text("rules", local_rules::max_size);
+    return content ? local_rules::parse(*content) : local_rules{};
+} catch (const security_error& e) {
+    return local_rules::unreadable(e.what());
 }
 
 } // namespace cles::security

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "security/access/rights.hpp"
+#include "security/fleet/protected_folder.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -51,5 +52,9 @@ class local_rules {
     std::vector<rule> rules_;
     std::string error_;
 };
+
+/// Reads `rules` in a node's directory. Without this file there are no rules; if it cannot be read, belongs to another
+/// user, or has an error, the result denies everything.
+[[nodiscard]] local_rules read_local_rules(const protected_folder& folder);
 
 } // namespace cles::security

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/access/rights.hpp"
 
+#include <cles/security/member_rights.hpp>
+
 #include "security/access/wildcard.hpp"
 
 #include <algorithm>
@@ -42,9 +44,8 @@ std::uint8_t read_verbs(std::string_view text) {
 }
 
 void append_name(std::string_view pattern, std::string_view what, std::string& out) {
-    if (!is_name_pattern(pattern)) {
-        throw refusal{"the " + std::string{what} + " " + protocol::quoted(pattern) +
-                      " is not the pattern of a name (letters, digits, '_', '-', '.', and '*' for any characters)"};
+    if (const auto flaw = flaw_of_name_pattern(pattern); !flaw.empty()) {
+        throw refusal{"the " + std::string{what} + " " + flaw};
     }
     out.append(pattern);
     std::replace(out.end() - static_cast<std::ptrdiff_t>(pattern.size()), out.end(), '*', any);
@@ -80,6 +81,22 @@ bool next_fits(std::string_view& pattern, std::string_view text) noexcept {
 }
 
 } // namespace
+
+void decoded_noun::assign(std::string_view target, const protocol::noun_view& noun) {
+    target_ = target;
+    task_ = noun.task;
+    parameters_ = noun.parameters;
+    if (noun.path.find('%') == std::string_view::npos) {
+        return;
+    }
+    decoded_.clear();
+    decoded_.reserve(noun.path.size()); // never exceeded, so the views stay valid
+    for (auto& parameter : parameters_) {
+        const auto from = decoded_.size();
+        protocol::decode_parameter(parameter, decoded_);
+        parameter = std::string_view{decoded_}.substr(from);
+    }
+}
 
 std::optional<right> right::parse(std::string_view text, std::string* why) try {
     const auto space = text.find(' ');
@@ -150,6 +167,19 @@ std::int32_t rights::find(verb asked, const decoded_noun& noun) const noexcept {
     const auto found =
         std::find_if(valid_.begin(), valid_.end(), [&](const auto& each) { return each.second.permits(asked, noun); });
     return found == valid_.end() ? nothing : found->first;
+}
+
+std::string flaw_of_right(std::string_view text) {
+    std::string why;
+    return right::parse(text, &why) ? std::string{} : why;
+}
+
+std::string flaw_of_name_pattern(std::string_view text) {
+    if (is_name_pattern(text)) {
+        return {};
+    }
+    return protocol::quoted(text) +
+           " is not the pattern of a name (letters, digits, '_', '-', '.', and '*' for any characters)";
 }
 
 } // namespace cles::security

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/datagrams/datagram_format.hpp"
 
-#include "security/datagrams/byte_order.hpp"
+#include "security/keys/bytes.hpp"
 
 #include <algorithm>
 #include <string_view>

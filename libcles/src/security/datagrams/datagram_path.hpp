@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "security/datagrams/byte_order.hpp"
+#include "security/keys/bytes.hpp"
 
 #include <array>
 #include <cstddef>

@@ -2,7 +2,6 @@
 #pragma once
 
 #include "security/datagrams/datagram_session.hpp"
-#include "security/datagrams/unanswered.hpp"
 
 #include <boost/unordered/unordered_flat_map.hpp>
 
@@ -12,7 +11,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace cles::security {
@@ -33,6 +31,35 @@ struct hello_attempt {
     std::uint64_t index;
     std::uint64_t order;
     time_point begun;
+};
+
+/// When something that is not answered is sent again: after 200 ms, then at doubling intervals, three times in all.
+class unanswered {
+  public:
+    void start(time_point now) noexcept {
+        sent_ = 1;
+        due_ = now + first;
+    }
+    void stop() noexcept { sent_ = 0; }
+    /// When to call `expire`.
+    [[nodiscard]] time_point due() const noexcept { return sent_ == 0 ? time_point::max() : due_; }
+    /// \pre it is due \return whether to send again; false: give up, and it has stopped
+    [[nodiscard]] bool expire(time_point now) noexcept {
+        if (sent_ == most) {
+            stop();
+            return false;
+        }
+        due_ = now + first * (1 << sent_);
+        ++sent_;
+        return true;
+    }
+
+  private:
+    static constexpr int most = 3;
+    static constexpr std::chrono::milliseconds first{200};
+
+    int sent_ = 0;
+    time_point due_{};
 };
 
 /// What a node keeps of one source: the sessions with it, newest first, and the lines that wait for one.

@@ -8,7 +8,6 @@
 #include "security/datagrams/noise_kk.hpp"
 #include "security/datagrams/replay_window.hpp"
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>

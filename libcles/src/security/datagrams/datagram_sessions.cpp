@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <span>
-#include <string>
 
 namespace cles::security {
 namespace {
 
 using introduction = datagram_peer::introduction;
-
-bytes_view to_bytes(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
 
 } // namespace
 
@@ -135,7 +132,7 @@ void datagram_sessions::receive_data(const datagram_path& from, const datagram_h
         }
     }
     if (*length != 0) {
-        sink_.opened(source, agreed.stated.epoch, {reinterpret_cast<const char*>(opened_.data()), *length});
+        sink_.opened(source, agreed.stated.epoch, as_text({opened_.data(), *length}));
     }
 }
 
@@ -165,7 +162,7 @@ bool datagram_sessions::send(const datagram_source& to, std::string_view line, t
 
 void datagram_sessions::send_in(peer& p, datagram_session& session, std::string_view line, time_point now) {
     p.last_used = now;
-    sink_.send(p.source().path, session.seal(fleet_.self()->number, to_bytes(line), sealed_));
+    sink_.send(p.source().path, session.seal(fleet_.self()->number, as_bytes(line), sealed_));
 }
 
 bool datagram_sessions::send_waiting(peer& p, time_point now) {
@@ -338,15 +335,12 @@ void datagram_sessions::forget(std::uint32_t member) {
 }
 
 void datagram_sessions::on_roster(const roster& before) {
-    const auto* const self = fleet_.self();
-    const auto* const self_before = before.find(fleet_.own_key().public_part());
-    if (self == nullptr || self_before == nullptr || !self->is(*self_before)) {
+    if (!fleet_.is_same_since(before)) {
         clear();
         return;
     }
     for (const auto& member : before.members()) {
-        const auto* const now = fleet_.in_force().find(member.number);
-        if (now == nullptr || !now->is(member)) {
+        if (!fleet_.in_force().has(member)) {
             forget(member.number);
         }
     }

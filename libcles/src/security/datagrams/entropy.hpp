@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "security/keys/bytes.hpp"
+
 #include <array>
 #include <cstdint>
 #include <span>
@@ -19,11 +21,7 @@ class entropy {
     [[nodiscard]] Integer draw() {
         std::array<std::uint8_t, sizeof(Integer)> bytes{};
         fill(bytes);
-        Integer value = 0;
-        for (const auto byte : bytes) {
-            value = static_cast<Integer>(value << 8U | byte);
-        }
-        return value;
+        return static_cast<Integer>(load_big<sizeof(Integer)>(bytes.data()));
     }
 
   protected:

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 namespace cles::security {
 
@@ -15,9 +16,7 @@ class fork_detector {
     /// True once in each child process.
     [[nodiscard]] bool forked() {
         const auto now = fork_count();
-        const bool changed = now != seen_;
-        seen_ = now;
-        return changed;
+        return std::exchange(seen_, now) != now;
     }
 
   private:

@@ -42,9 +42,8 @@ group_receiver::result group_receiver::open(const datagram_path& from, bytes_vie
             datagram.data(), group_head_bytes, datagram.data() + group_nonce_at, key->data()) != 0) {
         return {};
     }
-    result opened{
-        .what = verdict::unknown_salt,
-        .line = {reinterpret_cast<const char*>(opened_.data()), datagram.size() - group_head_bytes - seal_bytes}};
+    result opened{.what = verdict::unknown_salt,
+                  .line = as_text({opened_.data(), datagram.size() - group_head_bytes - seal_bytes})};
     if (const auto* const known = salts_.find(head->sender, head->salt)) {
         opened.what = verdict::opened;
         opened.epoch = known->epoch;

@@ -41,9 +41,9 @@ bytes_view group_sender::seal(std::string_view line) {
         return {};
     }
     write_group_head(fleet_.self()->number, generation, salt_, counter_, sealed_.data());
-    crypto_aead_xchacha20poly1305_ietf_encrypt(
-        sealed_.data() + group_head_bytes, nullptr, reinterpret_cast<const std::uint8_t*>(line.data()), line.size(),
-        sealed_.data(), group_head_bytes, nullptr, sealed_.data() + group_nonce_at, key->data());
+    crypto_aead_xchacha20poly1305_ietf_encrypt(sealed_.data() + group_head_bytes, nullptr, as_bytes(line).data(),
+                                               line.size(), sealed_.data(), group_head_bytes, nullptr,
+                                               sealed_.data() + group_nonce_at, key->data());
     // The last counter is not used, so that the next one can always be stated.
     if (++counter_ == std::numeric_limits<std::uint64_t>::max()) {
         draw_salt();

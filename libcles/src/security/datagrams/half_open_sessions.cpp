@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/datagrams/half_open_sessions.hpp"
 
-#include "security/datagrams/byte_order.hpp"
+#include "security/keys/bytes.hpp"
 
 #include <algorithm>
 #include <array>

@@ -46,8 +46,7 @@ void salt_table::forget(std::uint32_t member, std::span<const std::uint8_t> begi
 
 void salt_table::on_roster(const roster& before) {
     for (const auto& member : before.members()) {
-        const auto* const now = fleet_.in_force().find(member.number);
-        if (now == nullptr || !now->is(member)) {
+        if (!fleet_.in_force().has(member)) {
             members_.erase(member.number);
         }
     }

@@ -5,7 +5,7 @@
 
 #include "json/json_members.hpp"
 #include "protocol/request_line.hpp"
-#include "security/keys/byte_text.hpp"
+#include "security/keys/bytes.hpp"
 
 #include <utility>
 

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/security/checked_file.hpp>
 
-#include "security/fleet/descriptor.hpp"
 #include "security/fleet/file_protection.hpp"
-#include "security/fleet/private_group.hpp"
 #include "security/keys/keys.hpp"
 
 #include <algorithm>

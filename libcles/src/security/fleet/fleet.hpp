@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "security/fleet/group_key_ring.hpp"
+#include "security/fleet/group_keys.hpp"
 #include "security/fleet/roster.hpp"
 
 #include <cstdint>
@@ -37,6 +37,8 @@ class fleet {
     [[nodiscard]] std::shared_ptr<const roster> share() const noexcept { return roster_; }
     /// This node's entry; null once it has been removed, also if its key is listed under another name.
     [[nodiscard]] const member* self() const noexcept { return self_; }
+    /// Whether this node is the same member as in that roster.
+    [[nodiscard]] bool is_same_since(const roster& before) const { return self_ != nullptr && before.has(*self_); }
     /// Empty if this node has been removed, or if the roster in force has group keys that it cannot open.
     [[nodiscard]] const group_key_ring& ring() const noexcept { return ring_; }
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/fleet/fleet_authority.hpp"
 
-#include <cles/json_writer.hpp>
-
+#include "json/json_members.hpp"
 #include "json/json_scan.hpp"
 #include "protocol/grammar.hpp"
 
@@ -12,39 +11,22 @@
 namespace cles::security {
 namespace {
 
-void write_texts(json_writer& out, std::string_view key, const std::vector<std::string>& texts) {
-    out.plain_key(key);
-    out.begin_array();
-    for (const auto& text : texts) {
-        out.value(std::string_view{text});
-    }
-    out.end_array();
-}
+using core::write_member;
 
-void write_text(json_writer& out, std::string_view key, std::string_view text) {
-    out.plain_key(key);
-    out.value(text);
-}
-
-void write_number(json_writer& out, std::string_view key, std::uint32_t number) {
-    out.plain_key(key);
-    out.value(std::uint64_t{number});
-}
-
-void write_member(json_writer& out, const member& entry) {
+void write_entry(json_writer& out, const member& entry) {
     out.begin_object();
-    write_number(out, "number", entry.number);
-    write_text(out, "name", entry.name);
-    write_text(out, "key", to_base64url(entry.key));
-    write_text(out, "keys", entry.group_keys);
+    write_member(out, "number", entry.number);
+    write_member(out, "name", entry.name);
+    write_member(out, "key", to_base64url(entry.key));
+    write_member(out, "keys", entry.group_keys);
     if (entry.may) {
-        write_texts(out, "may", *entry.may);
+        write_member(out, "may", *entry.may);
     }
     if (entry.offers) {
-        write_texts(out, "offers", *entry.offers);
+        write_member(out, "offers", *entry.offers);
     }
     if (!entry.forwards.empty()) {
-        write_texts(out, "forwards", entry.forwards);
+        write_member(out, "forwards", entry.forwards);
     }
     out.end_object();
 }
@@ -60,9 +42,7 @@ void permit(member& entry, const member_rights& rights) {
     check(rights.may.value_or(std::vector<std::string>{}));
     check(rights.offers.value_or(std::vector<std::string>{}));
     check(rights.forwards);
-    entry.may = rights.may;
-    entry.offers = rights.offers;
-    entry.forwards = rights.forwards;
+    static_cast<member_rights&>(entry) = rights;
 }
 
 } // namespace
@@ -103,16 +83,16 @@ struct fleet_authority::draft {
         std::string text;
         json_writer out{text};
         out.begin_object();
-        write_text(out, "fleet", to_base64url(fleet));
-        write_number(out, "version", version);
-        write_number(out, "last", last);
-        write_number(out, "generation", generation);
-        write_number(out, "oldest", oldest);
-        write_text(out, "keys", authority_keys);
+        write_member(out, "fleet", to_base64url(fleet));
+        write_member(out, "version", version);
+        write_member(out, "last", last);
+        write_member(out, "generation", generation);
+        write_member(out, "oldest", oldest);
+        write_member(out, "keys", authority_keys);
         out.plain_key("members");
         out.begin_array();
         for (const auto& entry : members) {
-            write_member(out, entry);
+            write_entry(out, entry);
         }
         out.end_array();
         out.end_object();

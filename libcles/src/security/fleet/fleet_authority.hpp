@@ -1,18 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/security/member_rights.hpp>
-
 #include "security/fleet/group_keys.hpp"
 #include "security/fleet/roster.hpp"
 #include "security/keys/identity.hpp"
 
-#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace cles::security {
 

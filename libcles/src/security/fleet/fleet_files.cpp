@@ -28,7 +28,7 @@ fleet_description describe(const roster& from) {
                           .oldest = from.oldest(),
                           .line = from.line()};
     for (const auto& each : from.members()) {
-        out.members.push_back({each.number, each.name, to_base64url(each.key), {each.may, each.offers, each.forwards}});
+        out.members.push_back({each.number, each.name, to_base64url(each.key), each.rights()});
     }
     return out;
 }
@@ -103,7 +103,7 @@ member_rights change_rights(const std::string& directory, const std::string& nam
     if (found == nullptr) {
         throw security_error{protocol::quoted(name) + " is not a member of the fleet"};
     }
-    member_rights rights{found->may, found->offers, found->forwards};
+    auto rights = found->rights();
     change(rights);
     stored.authority.set_rights(name, rights);
     stored.store();

@@ -16,10 +16,6 @@ const std::string roster_lock = ".roster.lock";
 
 using file_access = protected_folder::access;
 
-bytes_view bytes_of_text(std::string_view text) noexcept {
-    return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
-}
-
 // Calls `read`; adds the path to its error.
 template <class Read>
 auto naming(const std::string& path, Read read) {
@@ -63,8 +59,10 @@ node_identity key_directory::create_key(const std::string& name) const {
 
 void key_directory::write_public_identity(const public_identity& identity) const {
     require_node_name(identity.name);
-    folder_.replace_file(identity.name + ".pub", bytes_of_text(to_line(identity)), file_access::readable);
+    folder_.replace_file(identity.name + ".pub", as_bytes(to_line(identity)), file_access::readable);
 }
+
+bool key_directory::has_key() const { return folder_.read_secret(key_file, max_key_file).has_value(); }
 
 node_identity key_directory::read_key() const {
     const auto content = folder_.read_secret(key_file, max_key_file);
@@ -152,13 +150,13 @@ bool key_directory::store_roster(const roster& newest) const {
     if (stored && stored->version() >= newest.version()) {
         return stored->content() == newest.content();
     }
-    folder_.replace_file(roster_file, bytes_of_text(file_line(newest)), file_access::readable);
+    folder_.replace_file(roster_file, as_bytes(file_line(newest)), file_access::readable);
     return true;
 }
 
 void key_directory::write_join(const std::string& name, const roster& newest) const {
     require_node_name(name);
-    folder_.replace_file(name + ".join", bytes_of_text(file_line(newest)), file_access::readable);
+    folder_.replace_file(name + ".join", as_bytes(file_line(newest)), file_access::readable);
 }
 
 } // namespace cles::security

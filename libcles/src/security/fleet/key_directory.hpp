@@ -7,7 +7,6 @@
 
 #include <memory>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace cles::security {
@@ -33,6 +32,7 @@ class key_directory {
 
     /// Creates `key` with a new private key, and `NAME.pub`. An existing key is never replaced.
     node_identity create_key(const std::string& name) const;
+    [[nodiscard]] bool has_key() const;
     [[nodiscard]] node_identity read_key() const;
     /// Writes `NAME.pub`.
     void write_public_identity(const public_identity& identity) const;

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/security/node_files.hpp>
 
-#include "security/access/rules_file.hpp"
+#include "security/access/local_rules.hpp"
 #include "security/fleet/group_keys.hpp"
 #include "security/fleet/key_directory.hpp"
-
-#include <memory>
-#include <utility>
 
 namespace cles::security {
 namespace {
@@ -23,8 +20,6 @@ std::string reason_not_in(const roster& read, const node_identity& own) {
            (read.find(own.name) != nullptr ? " has another key of " + own.name : " does not contain " + own.name);
 }
 
-bool has_key(const key_directory& files) { return files.folder().read_secret("key", 1024).has_value(); }
-
 node_description describe(const key_directory& files, const node_identity& own) {
     node_description out{.name = own.name, .key = to_base64url(own.key.public_part())};
     if (const auto newest = files.read_newest_roster(out.warnings)) {
@@ -32,8 +27,7 @@ node_description describe(const key_directory& files, const node_identity& own) 
         out.version = newest->version();
         out.reason = reason_not_in(*newest, own);
         if (out.reason.empty()) {
-            const auto& listed = *newest->find(own.name);
-            out.rights = member_rights{listed.may, listed.offers, listed.forwards};
+            out.rights = newest->find(own.name)->rights();
         }
     } else {
         out.reason = "there is no roster";
@@ -48,7 +42,7 @@ node_description describe(const key_directory& files, const node_identity& own) 
 
 created_key create_node_key(const std::string& directory, const std::string& name) {
     const auto files = key_directory::create(directory);
-    if (has_key(files)) {
+    if (files.has_key()) {
         throw security_error{files.folder().path_of("key") +
                              " already exists, and is never replaced: use another directory, or the key that is there"};
     }

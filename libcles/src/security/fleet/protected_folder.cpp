@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/fleet/protected_folder.hpp"
 
-#include "security/fleet/file_protection.hpp"
 #include "security/keys/keys.hpp"
 
 #include <algorithm>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "security/fleet/descriptor.hpp"
+#include "security/fleet/file_protection.hpp"
 #include "security/keys/secret.hpp"
 
 #include <cstddef>

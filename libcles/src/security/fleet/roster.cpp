@@ -3,6 +3,7 @@
 
 #include <cles/json_reader.hpp>
 
+#include "json/json_members.hpp"
 #include "protocol/grammar.hpp"
 #include "security/fleet/group_keys.hpp"
 
@@ -92,11 +93,7 @@ bool read_sealed(json_reader& in, std::string& out) {
 }
 
 bool read_texts(json_reader& in, std::vector<std::string>& out) {
-    in.begin_array();
-    while (in.next_element()) {
-        in.read(out.emplace_back());
-    }
-    return in.ok();
+    return core::read_texts(in, [&out](std::string_view text) { out.emplace_back(text); });
 }
 
 } // namespace
@@ -344,6 +341,11 @@ const member* roster::find(const public_key& key) const {
     const auto found = std::ranges::lower_bound(
         by_key_, key, {}, [&](std::uint32_t at) -> const public_key& { return members_[at].key; });
     return found != by_key_.end() && members_[*found].key == key ? &members_[*found] : nullptr;
+}
+
+bool roster::has(const member& other) const {
+    const auto* const found = find(other.number);
+    return found != nullptr && found->is(other);
 }
 
 } // namespace cles::security

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/security/member_rights.hpp>
+
 #include "security/keys/keys.hpp"
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -20,15 +21,14 @@ inline constexpr std::uint32_t max_version = 0xFFFF'FFFF;
 inline constexpr std::uint32_t max_generation = 0xFFFF'FFFE;
 
 /// A node of the fleet, as the roster lists it.
-struct member {
+struct member : member_rights {
     std::uint32_t number = 0; ///< 1 to 2^24-1, never given again
     std::string name{};
     public_key key{};
-    agreement_key agreement{};                        ///< the X25519 form of `key`
-    std::string group_keys{};                         ///< sealed for this member, as written
-    std::optional<std::vector<std::string>> may{};    ///< rights; none: everything
-    std::optional<std::vector<std::string>> offers{}; ///< rights; none: everything
-    std::vector<std::string> forwards{};              ///< patterns of the names for which it may forward
+    agreement_key agreement{}; ///< the X25519 form of `key`
+    std::string group_keys{};  ///< sealed for this member, as written
+
+    [[nodiscard]] const member_rights& rights() const noexcept { return *this; }
 
     /// Whether it is the same member, whatever its rights.
     [[nodiscard]] bool is(const member& other) const noexcept {
@@ -62,6 +62,8 @@ class roster {
     [[nodiscard]] const member* find(std::uint32_t number) const;
     [[nodiscard]] const member* find(std::string_view name) const;
     [[nodiscard]] const member* find(const public_key& key) const;
+    /// Whether it lists the same member, whatever its rights.
+    [[nodiscard]] bool has(const member& other) const;
     /// The group keys, sealed for the fleet's key, as written.
     [[nodiscard]] const std::string& authority_keys() const noexcept { return authority_keys_; }
     /// A key of the roster or of a member that this version ignores; empty if there is none.

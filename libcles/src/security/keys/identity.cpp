@@ -42,10 +42,6 @@ std::optional<named_key> split_named_key(std::string_view line, std::string_view
     return named_key{name, rest.substr(middle.size(), key_text_size)};
 }
 
-std::string_view text_of(bytes_view bytes) noexcept {
-    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 std::optional<signing_key> read_seed(std::string_view text) {
     secret_bytes seed{seed_size};
     if (!read_base64url(text, seed.span())) {
@@ -111,7 +107,7 @@ public_identity read_public_identity(std::string_view line) {
 }
 
 node_identity read_node_identity(bytes_view line) {
-    const auto parts = split_named_key(text_of(line), seed_start);
+    const auto parts = split_named_key(as_text(line), seed_start);
     auto key = parts ? read_seed(parts->key) : std::nullopt;
     if (!key) {
         throw security_error{R"(expected a line of the form {"name":"car1","seed":"<43 characters>"})"};
@@ -121,7 +117,7 @@ node_identity read_node_identity(bytes_view line) {
 }
 
 signing_key read_fleet_key(bytes_view line) {
-    auto text = text_of(line);
+    auto text = as_text(line);
     text.remove_suffix(text.ends_with('\n') ? 1 : 0);
     if (text.size() == fleet_seed_start.size() + key_text_size + key_end.size() && text.starts_with(fleet_seed_start) &&
         text.ends_with(key_end)) {

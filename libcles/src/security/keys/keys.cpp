@@ -9,10 +9,6 @@
 namespace cles::security {
 namespace {
 
-const std::uint8_t* bytes_of(std::string_view text) noexcept {
-    return reinterpret_cast<const std::uint8_t*>(text.data());
-}
-
 constexpr auto unpadded = sodium_base64_VARIANT_URLSAFE_NO_PADDING;
 
 } // namespace
@@ -31,7 +27,7 @@ signing_key::signing_key(secret_bytes seed)
 
 signature signing_key::sign(std::string_view text) const {
     signature made{};
-    crypto_sign_detached(made.data(), nullptr, bytes_of(text), text.size(), secret_.data());
+    crypto_sign_detached(made.data(), nullptr, as_bytes(text).data(), text.size(), secret_.data());
     return made;
 }
 
@@ -50,7 +46,7 @@ secret_bytes signing_key::open_box(bytes_view box) const {
 
 bool verify(const public_key& by, std::string_view text, const signature& made) {
     prepare_sodium();
-    return crypto_sign_verify_detached(made.data(), bytes_of(text), text.size(), by.data()) == 0;
+    return crypto_sign_verify_detached(made.data(), as_bytes(text).data(), text.size(), by.data()) == 0;
 }
 
 std::optional<agreement_key> agreement_form(const public_key& key) {

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "security/keys/bytes.hpp"
+
 #include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
 
 namespace cles::security {
-
-using bytes_view = std::span<const std::uint8_t>;
 
 /// Prepares libsodium, once for the process. Whatever calls libsodium without a secret or a key calls this first.
 /// \throws std::runtime_error if the system has no random numbers

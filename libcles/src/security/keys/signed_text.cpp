@@ -3,6 +3,7 @@
 
 #include "protocol/grammar.hpp"
 
+#include <algorithm>
 #include <array>
 #include <initializer_list>
 
@@ -13,12 +14,7 @@ using challenge_bytes = std::array<std::uint8_t, 16>;
 
 // A part with a line end would give the text a second reading.
 bool has_line_end(std::initializer_list<std::string_view> parts) {
-    for (const auto part : parts) {
-        if (part.find('\n') != std::string_view::npos) {
-            return true;
-        }
-    }
-    return false;
+    return std::ranges::any_of(parts, [](auto part) { return part.find('\n') != std::string_view::npos; });
 }
 
 std::string join_lines(std::initializer_list<std::string_view> lines) {
@@ -30,19 +26,6 @@ std::string join_lines(std::initializer_list<std::string_view> lines) {
 }
 
 std::string_view body_or_default(std::string_view body) { return body.empty() ? std::string_view{"{}"} : body; }
-
-template <class Signed>
-bool verify_text(const public_key& by, const public_key& fleet, const Signed& what, std::string_view sig) {
-    signature made{};
-    if (!read_base64url(sig, made)) {
-        return false;
-    }
-    try {
-        return verify(by, text_to_sign(fleet, what), made);
-    } catch (const security_error&) { // nobody signs such a text
-        return false;
-    }
-}
 
 } // namespace
 
@@ -82,12 +65,19 @@ std::string text_to_sign(const public_key& fleet, const signed_update& update) {
         {"cles update 1", to_base64url(fleet), update.publisher, update.noun, position, body_or_default(update.body)});
 }
 
-bool verify(const public_key& by, const public_key& fleet, const signed_request& request, std::string_view sig) {
-    return verify_text(by, fleet, request, sig);
+template <class Signed>
+bool verify(const public_key& by, const public_key& fleet, const Signed& what, std::string_view sig) {
+    signature made{};
+    if (!read_base64url(sig, made)) {
+        return false;
+    }
+    try {
+        return verify(by, text_to_sign(fleet, what), made);
+    } catch (const security_error&) { // nobody signs such a text
+        return false;
+    }
 }
-
-bool verify(const public_key& by, const public_key& fleet, const signed_update& update, std::string_view sig) {
-    return verify_text(by, fleet, update, sig);
-}
+template bool verify(const public_key&, const public_key&, const signed_request&, std::string_view);
+template bool verify(const public_key&, const public_key&, const signed_update&, std::string_view);
 
 } // namespace cles::security

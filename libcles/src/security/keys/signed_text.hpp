@@ -50,7 +50,7 @@ std::string sign(const signing_key& key, const public_key& fleet, const Signed& 
 }
 
 /// Whether `sig` is the value of `sig=` for this by the owner of the key.
-bool verify(const public_key& by, const public_key& fleet, const signed_request& request, std::string_view sig);
-bool verify(const public_key& by, const public_key& fleet, const signed_update& update, std::string_view sig);
+template <class Signed>
+bool verify(const public_key& by, const public_key& fleet, const Signed& what, std::string_view sig);
 
 } // namespace cles::security

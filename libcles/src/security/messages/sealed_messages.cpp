@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/messages/sealed_messages.hpp"
 
-#include "security/datagrams/byte_order.hpp"
-#include "security/keys/byte_text.hpp"
+#include "security/keys/bytes.hpp"
 #include "security/keys/keys.hpp"
 #include "security/keys/signed_text.hpp"
 

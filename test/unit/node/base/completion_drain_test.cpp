@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "asio/asio_environment.hpp"
-#include "node/base/completion_drain.hpp"
+#include "node/base/completion_queue.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>

@@ -3,11 +3,24 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <string_view>
 
-/// Big-endian integers of a given number of bytes.
+/// Bytes, as text and as integers.
 
 namespace cles::security {
 
+using bytes_view = std::span<const std::uint8_t>;
+
+[[nodiscard]] inline bytes_view as_bytes(std::string_view text) noexcept {
+    return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+[[nodiscard]] inline std::string_view as_text(bytes_view bytes) noexcept {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+/// Big-endian integers of a given number of bytes.
 template <std::size_t Bytes>
 [[nodiscard]] constexpr std::uint64_t load_big(const std::uint8_t* from) noexcept {
     std::uint64_t value = 0;
