@@ -3,8 +3,6 @@
 
 #include "node/publish/binding.hpp"
 
-#include <algorithm>
-
 namespace cles::core {
 
 void send_updates(unsent_topics& unsent, publications& published, time_point now) {

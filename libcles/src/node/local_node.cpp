@@ -11,7 +11,6 @@
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace cles {
 namespace {
@@ -131,9 +130,8 @@ local_node::local_node(std::shared_ptr<core::environment> by, local_node_options
     : environment_(std::move(by)), networks_(options.networks),
       node_(std::make_shared<node_state>(complete(std::move(options.node), environment_), *environment_,
                                          [this] { flush_scheduler_.schedule_turn(); })),
-      insecure_(options.insecure), multicast_(std::move(options.multicast)), gossip_(std::move(options.gossip)),
-      on_name_taken_(std::move(options.on_name_taken)), routing_wanted_(options.routing) {
-    for (const auto& [name, where] : options.peers) {
+      options_(std::move(options)) {
+    for (const auto& [name, where] : options_.peers) {
         peer_channels_.set_peer(name, where);
     }
     discovery_ = std::make_unique<core::discovery>(*this, environment_->random());
@@ -154,8 +152,8 @@ void local_node::start(const std::vector<std::string>& listen_at) {
         }
     });
     node_->deadlines.set_observer([this](time_point earliest) { schedule_.follow(earliest); });
-    if (routing_wanted_ != nullptr) {
-        routing_ = routing_wanted_->make(*this);
+    if (options_.routing != nullptr) {
+        routing_ = options_.routing->make(*this);
     }
     if (node_->secured) {
         node_->secured->start(*this);
@@ -166,11 +164,11 @@ void local_node::start(const std::vector<std::string>& listen_at) {
     if (node_->pools) {
         node_->pools->start(*this);
     }
-    if (multicast_.is_on()) {
+    if (options_.multicast.is_on()) {
         join_group();
     }
-    if (gossip_.part != nullptr || !gossip_.seeds.empty()) {
-        discovery_->gossip(gossip_);
+    if (options_.gossip.part != nullptr || !options_.gossip.seeds.empty()) {
+        discovery_->gossip(options_.gossip);
     } else {
         discovery_->start();
     }
@@ -198,12 +196,12 @@ void local_node::check_shutdown() {
 void local_node::join_group() {
     try {
         auto group = std::make_unique<multicast_group>(node_, environment_->random(), weak_from_this());
-        group->join(*environment_, multicast_, insecure_);
+        group->join(*environment_, options_.multicast, options_.insecure);
         group_ = std::move(group);
         group_->start();
         discovery_->join(*group_);
     } catch (const error& e) {
-        if (multicast_.required) {
+        if (options_.multicast.required) {
             throw;
         }
         write_log(log_level::warning, "no multicast: " + e.message());
@@ -219,10 +217,10 @@ void local_node::on_discovery_grace_over() {
 }
 
 void local_node::on_name_taken(const std::string& where) {
-    if (on_name_taken_) {
+    if (options_.on_name_taken) {
         post(*environment_, [self = shared_from_this(), where] {
             if (!self->stopped_) {
-                self->on_name_taken_(where);
+                self->options_.on_name_taken(where);
             }
         });
     }
@@ -231,16 +229,10 @@ void local_node::on_name_taken(const std::string& where) {
 // -- links ---------------------------------------------------------------------------------------------------------
 
 std::string local_node::listen(std::string_view where) {
-    auto local = listeners_.listen(where, insecure_);
+    auto local = listeners_.listen(where, options_.insecure);
     node_->endpoints.push_back(local);
     write_log(log_level::debug, node_->name + " listens on " + local);
     return local;
-}
-
-void local_node::forget(connection& c, std::uint64_t received, std::uint64_t sent) {
-    if (connections_.forget(c, received, sent)) {
-        peer_channels_.drop(c);
-    }
 }
 
 std::string local_node::unverified_address(const identity& peer) const {

@@ -61,7 +61,7 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     /// To be called once, when a shared_ptr owns this.
     void start(const std::vector<std::string>& listen_at);
     /// Whether it may be reached from other hosts, although they are not authenticated.
-    [[nodiscard]] bool is_insecure() const noexcept { return insecure_; }
+    [[nodiscard]] bool is_insecure() const noexcept { return options_.insecure; }
     std::string listen(std::string_view where);
     virtual void stop();
     /// Starts a graceful shutdown; the operation completes when the links have closed. Call `stop` afterwards.
@@ -97,8 +97,6 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     void on_discovery_grace_over();
     /// This node's name belongs to the node at `where`.
     void on_name_taken(const std::string& where);
-    /// `c` has ended.
-    void forget(connection& c, std::uint64_t received, std::uint64_t sent);
     [[nodiscard]] core::flush_scheduler& flush_scheduler() noexcept { return flush_scheduler_; }
 
     /// Calls `function` with this node in a task of its own, unless the node has been stopped or destroyed by then.
@@ -147,17 +145,13 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     ip_networks networks_;
     std::shared_ptr<node_state> node_;
     deadline_schedule schedule_{*environment_};
-    bool insecure_;
-    multicast_options multicast_;
-    gossip_options gossip_;
+    const local_node_options options_; // without `node`, which the state has
     core::peer_channels peer_channels_{*this};
     core::listeners listeners_{*this};
     core::connections connections_{*this};
     feed_links feeds_{*this};
     std::unique_ptr<multicast_group> group_;
     std::unique_ptr<core::discovery> discovery_;
-    std::function<void(std::string_view)> on_name_taken_;
-    const detail::routing_part* routing_wanted_;
     std::shared_ptr<router> routing_; // null: off
     core::flush_scheduler flush_scheduler_{*this, *node_};
     std::optional<graceful_shutdown> graceful_shutdown_; // set once a graceful shutdown has started

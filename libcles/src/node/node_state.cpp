@@ -16,11 +16,10 @@ node_state::node_state(node_options setup, const core::clock& source, const std:
       time(source), started(source.now()), completions(std::move(setup.complete)), memory(bounds.memory),
       kept_values(std::make_shared<memory_account>(memory, memory_account::share::half)),
       kept_requests(std::make_shared<memory_account>(memory)), peers(name, setup.epoch, deadlines, bounds.peers),
-      unsent(wake),
-      published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch, unsent),
+      unsent(wake), published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch,
+                              unsent, &tasks, security.get()),
       unsent_relayed(wake), remembered{.limit = bounds.remembered}, secured(security ? setup.secured(*this) : nullptr),
       spans(setup.tracing != nullptr ? setup.tracing->make(*this, source) : nullptr) {
-    published.sign_for(tasks, security.get());
     peers.begin(setup.pool, started);
 }
 

@@ -10,25 +10,15 @@
 #include "node/session/inbound.hpp"
 #include "node/session/request_checks.hpp"
 
-#include <algorithm>
 #include <chrono>
-#include <string>
 #include <utility>
 
 namespace cles::core {
 
 namespace {
 
-std::chrono::milliseconds lease_of(const protocol::request_line& r) {
-    return std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)};
-}
-
 std::string head_of(const topic& t, bool wants_mark) {
     return wants_mark ? protocol::mark_text(t.last_mark()) : std::string{};
-}
-
-binding::terms terms_of(const protocol::request_line& r) {
-    return {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep};
 }
 
 } // namespace
@@ -36,19 +26,13 @@ binding::terms terms_of(const protocol::request_line& r) {
 bind_requests::bind_requests(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates,
                              const identity& peer, reply_writer& replies)
     : shared_node_(std::move(host)), node_(*shared_node_), peer_(peer), out_(out), replies_(replies), updates_(updates),
-      bound_(node_.published, updates) {
-    if (out.datagram() != 0) {
-        leases_.emplace(node_.deadlines, [this](const leased& which) {
-            ++node_.counts.leases_expired;
-            drop(which);
-        });
-    }
-}
+      bound_(node_.published, updates), leases_(node_.deadlines, [this](const leased& which) {
+          ++node_.counts.leases_expired;
+          drop(which);
+      }) {}
 
 void bind_requests::clear() {
-    if (leases_) {
-        leases_->clear();
-    }
+    leases_.clear();
     pending_.clear();
     remote_bindings_.reset();
     requesters_.clear();
@@ -63,16 +47,13 @@ void bind_requests::drain(time_point now) {
 }
 
 void bind_requests::drop(const leased& which) {
+    leases_.drop(which);
     if (which.node.empty()) {
-        unbind(which.path.text);
+        requesters_.erase(which.path.text);
+        bound_.unbind(which.path.text);
     } else if (remote_bindings_) {
         remote_bindings_->unbind(which.node, which.path);
     }
-}
-
-void bind_requests::unbind(std::string_view path) {
-    requesters_.erase(std::string{path});
-    bound_.unbind(path);
 }
 
 std::vector<bind_requests::leased> bind_requests::forbidden() const {
@@ -92,9 +73,6 @@ std::vector<bind_requests::leased> bind_requests::forbidden() const {
 
 void bind_requests::drop_forbidden() {
     for (const auto& which : forbidden()) {
-        if (leases_) {
-            leases_->drop(which);
-        }
         drop(which);
     }
 }
@@ -105,9 +83,6 @@ void bind_requests::serve_remote(const protocol::request_line& r, time_point due
     const leased which{std::string{r.noun.target},
                        {std::string{protocol::canonical_path(r.noun, scratch)}, std::string{requester}}};
     if (r.unbinds()) {
-        if (leases_) {
-            leases_->drop(which);
-        }
         drop(which);
         replies_.done(reply_target{r}, {});
         return;
@@ -122,33 +97,31 @@ void bind_requests::serve_remote(const protocol::request_line& r, time_point due
         remote_bindings_ =
             std::make_unique<relayed_bindings>(node_.published, bound_, node_.active_router->relayed(), updates_);
     }
-    set_lease(which, lease_of(r), now);
+    set_lease(which, r, now);
     node_.active_router->bind(r, requester, *remote_bindings_, due, now, from);
 }
 
-void bind_requests::set_lease(const leased& which, std::chrono::milliseconds lease, time_point now) {
-    if (leases_) {
-        leases_->set(which, saturating_add(now, lease));
+void bind_requests::set_lease(const leased& which, const protocol::request_line& r, time_point now) {
+    if (out_.is_datagram()) {
+        const std::chrono::milliseconds lease{r.lease_ms.value_or(protocol::default_lease_ms)};
+        leases_.set(which, saturating_add(now, lease));
     }
 }
 
 void bind_requests::bind(topic& t, const protocol::request_line& r, std::string_view path, time_point now) {
-    bound_.bind(t, terms_of(r));
+    bound_.bind(t, {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep});
     if (node_.security) {
         requesters_.insert_or_assign(std::string{path}, std::string{requester_of(node_, peer_, r)});
     }
-    set_lease({{}, {std::string{path}}}, lease_of(r), now);
+    set_lease({{}, {std::string{path}}}, r, now);
 }
 
 void bind_requests::serve(const protocol::request_line& r, time_point due, time_point now, inbound& from) {
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);
     if (r.unbinds()) {
-        if (leases_) {
-            leases_->drop(leased{{}, {std::string{path}}});
-        }
         withdraw(path);
-        unbind(path);
+        drop({{}, {std::string{path}}});
         replies_.done(reply_target{r}, {});
         return;
     }
@@ -228,8 +201,7 @@ void bind_requests::withdraw(std::string_view path) {
             continue;
         }
         if (const auto c = a.answers.lock(); c && !c->ended()) {
-            c->fail({.code = errc::cancelled, .message = node_.name + ": it was unbound"});
-            c->stop();
+            c->abort({.code = errc::cancelled, .message = node_.name + ": it was unbound"});
         }
     }
 }

@@ -8,14 +8,11 @@
 #include "node/routing/relays.hpp"
 #include "node/session/line_sink.hpp"
 #include "node/session/reply_writer.hpp"
-#include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
-#include <chrono>
 #include <cstddef>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -66,15 +63,15 @@ class bind_requests {
     };
 
     [[nodiscard]] std::vector<leased> forbidden() const;
+    /// Ends a binding and its lease.
     void drop(const leased& which);
     void bind(topic& t, const protocol::request_line& request, std::string_view path, time_point now);
-    void unbind(std::string_view path);
     void serve_later(const protocol::request_line& request, std::string_view path, time_point due, time_point now,
                      inbound& from);
     void withdraw(std::string_view path);
     /// \throws cles::error if a limit is reached
     topic& open(std::string_view path);
-    void set_lease(const leased& which, std::chrono::milliseconds lease, time_point now);
+    void set_lease(const leased& which, const protocol::request_line& request, time_point now);
 
     std::shared_ptr<node_state> shared_node_;
     node_state& node_;
@@ -86,7 +83,7 @@ class bind_requests {
     std::unique_ptr<relayed_bindings> remote_bindings_; // few links need it
     std::vector<asking> pending_;                       // whose handlers have not decided yet
     std::map<std::string, std::string> requesters_;     // by path, of a secured node
-    std::optional<leases<leased>> leases_;              // over datagrams: nothing shows that the peer has gone
+    leases<leased> leases_;                             // over datagrams: nothing shows that the peer has gone
 };
 
 } // namespace cles::core

@@ -122,8 +122,7 @@ class leases {
         deadlines_.arm(open_.try_emplace(key, *this, key).first->second, until);
     }
     /// Does nothing if there is none.
-    template <class Same>
-    void drop(const Same& key) {
+    void drop(const Key& key) {
         if (const auto found = open_.find(key); found != open_.end()) {
             open_.erase(found);
         }
@@ -147,7 +146,7 @@ class leases {
 
     deadline_queue& deadlines_;
     std::function<void(const Key&)> over_;
-    std::map<Key, lease, std::less<>> open_;
+    std::map<Key, lease> open_;
 };
 
 } // namespace cles::core

@@ -9,12 +9,9 @@
 #include "node/security_protocol.hpp"
 #include "node/session/outbound.hpp"
 #include "node/session/request_checks.hpp"
-#include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -84,13 +81,13 @@ class feed_links::feed_reply final : public detail::pending {
     reply_function then_;
 };
 
-detail::pending_ptr feed_links::on_reply(const core::feed_machine& feed, reply_function then) {
+detail::pending_ptr feed_links::on_reply(const feed_machine& feed, reply_function then) {
     return detail::pending_ptr{new feed_reply(host_.weak_from_this(), feed.entry().handle, std::move(then))};
 }
 
 // The value in a reply is not signed. So if updates must be, or that is not known, only the publisher's own reply
 // counts.
-bool feed_links::is_value_trusted(core::feed_machine& feed) const {
+bool feed_links::is_value_trusted(feed_machine& feed) const {
     const auto c = feed.entry().on.lock();
     const auto& secured = host_.node().secured;
     if (!secured || !c || feed.target() == "all" || feed.target() == "self" || c->peer().transport == "inproc" ||
@@ -101,7 +98,7 @@ bool feed_links::is_value_trusted(core::feed_machine& feed) const {
     return !secured->must_be_signed(feed.target(), task).value_or(true);
 }
 
-void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, std::optional<time_point> asked,
+void feed_links::on_bind_reply(feed_machine& feed, const reply& received, std::optional<time_point> asked,
                                marking marks) {
     auto last = received.text;
     if (received.code) {
@@ -129,14 +126,13 @@ void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, 
     if (mark && marks == marking::up_to_it) {
         feed.skip_to(*mark);
     }
-    const auto lease = host_.bounds().lease;
     feed.on_bound(last, marks == marking::as_update ? mark : std::nullopt);
     if (asked) {
-        feed.on_leased(*asked, lease);
+        feed.on_leased(*asked);
     }
 }
 
-void feed_links::enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms) {
+void feed_links::enter(feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms) {
     feed.set_sharing_key("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) +
                          " hops=" + std::to_string(terms.hops) + " " + terms.adverbs);
     feed.entry().handle = std::move(handle);
@@ -144,18 +140,19 @@ void feed_links::enter(core::feed_machine& feed, std::weak_ptr<void> handle, fee
     feeds_.push_back(feed);
 }
 
-void feed_links::refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why) {
-    core::post(host_.environment(), [host = host_.shared_from_this(), handle = feed.entry().handle.lock(), &feed, code,
-                                     why] { feed.on_refused(code, why, host->now()); });
+void feed_links::refuse_later(feed_machine& feed, boost::system::error_code code, const std::string& why) {
+    post(host_.environment(), [host = host_.shared_from_this(), handle = feed.entry().handle.lock(), &feed, code, why] {
+        feed.on_refused(code, why, host->now());
+    });
 }
 
 // Feeds for clients have adverbs, with the client, whose rights have been checked.
-bool feed_links::is_permitted(core::feed_machine& feed) const {
+bool feed_links::is_permitted(feed_machine& feed) const {
     return !feed.entry().terms.adverbs.empty() || protocol::is_reserved_target(feed.target()) ||
            permits(host_.node(), host_.node().name, feed.target(), verb::bind, feed.path());
 }
 
-void feed_links::bind(core::feed_machine& feed) {
+void feed_links::bind(feed_machine& feed) {
     if (host_.stopped()) {
         refuse_later(feed, errc::stopped, "the service has been stopped");
         return;
@@ -167,8 +164,9 @@ void feed_links::bind(core::feed_machine& feed) {
     auto& e = feed.entry();
     boost::system::error_code code;
     std::string why;
-    auto* r = host_.peer_channels().to(feed.target(), e.terms.at, false, code, why,
-                                       {.via = e.terms.via, .requester = e.terms.requester});
+    auto* r = host_.peer_channels().to(
+        {.target = feed.target(), .at = e.terms.at, .by = {.via = e.terms.via, .requester = e.terms.requester}}, code,
+        why);
     if (r == nullptr) {
         refuse_later(feed, code, why);
         return;
@@ -188,7 +186,7 @@ void feed_links::bind(core::feed_machine& feed) {
                });
 }
 
-void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
+void feed_links::send_bind(feed_machine& feed, const std::shared_ptr<connection>& c) {
     auto& e = feed.entry();
     // For an existing binding, the publisher may have queued updates that are older than the value in its reply. (A
     // reply for `all` comes from several publishers, and has the mark of each value in its body.)
@@ -203,10 +201,10 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
     }
     e.on = c;
     const auto now = host_.now();
-    const auto asked = c->datagram() == 0 ? std::nullopt : std::optional{now};
+    const auto asked = c->is_datagram() ? std::optional{now} : std::nullopt;
     auto request = bind_request(feed, *c);
     request.wants_mark = marks != marking::none;
-    const auto whole = core::saturating_add(now, time_limit(e.terms.deadline, verb::bind));
+    const auto whole = saturating_add(now, time_limit(e.terms.deadline, verb::bind));
     const auto due = std::exchange(e.due, {}).value_or(whole);
     c->bind(feed, request, due > now ? due : whole,
             on_reply(feed, [&feed, asked, marks](local_node* host, const reply& received) {
@@ -216,14 +214,14 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
             }));
 }
 
-void feed_links::ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
+void feed_links::ask_for_features(feed_machine& feed, const std::shared_ptr<connection>& c) {
     auto& e = feed.entry();
     const auto now = host_.now();
     const auto whole = time_limit(e.terms.deadline, verb::bind);
     const auto limit = std::min(time_limit({}, verb::pull), whole);
-    e.due = core::saturating_add(now, whole);
+    e.due = saturating_add(now, whole);
     c->session().asking().send({.verb = verb::pull, .noun = "self:cles", .id = host_.draw_id()},
-                               core::saturating_add(now, limit), now,
+                               saturating_add(now, limit), now,
                                on_reply(feed, [&feed, on = std::weak_ptr{c}](local_node* host, const reply& received) {
                                    if (received.code == errc::unavailable || received.code == errc::busy) {
                                        if (host != nullptr) {
@@ -240,7 +238,7 @@ void feed_links::ask_for_features(core::feed_machine& feed, const std::shared_pt
                                }));
 }
 
-protocol::outgoing_request feed_links::bind_request(core::feed_machine& feed, const connection& c) {
+protocol::outgoing_request feed_links::bind_request(feed_machine& feed, const connection& c) {
     auto& e = feed.entry();
     protocol::outgoing_request request{.verb = verb::bind,
                                        .noun = e.terms.noun,
@@ -249,14 +247,14 @@ protocol::outgoing_request feed_links::bind_request(core::feed_machine& feed, co
                                        .keep = e.terms.keep,
                                        .hops = e.terms.hops,
                                        .adverbs = e.terms.adverbs};
-    if (c.datagram() != 0) {
+    if (c.is_datagram()) {
         request.lease_ms = static_cast<std::uint32_t>(host_.bounds().lease.count());
         e.asking = request.id;
     }
     return request;
 }
 
-void feed_links::renew(core::feed_machine& feed, time_point until) {
+void feed_links::renew(feed_machine& feed, time_point until) {
     if (const auto c = feed.entry().on.lock()) { // otherwise its loss has been reported
         const auto now = host_.now();
         const auto request = bind_request(feed, *c);
@@ -274,7 +272,7 @@ void feed_links::renew(core::feed_machine& feed, time_point until) {
     }
 }
 
-void feed_links::detach(core::feed_machine& feed) {
+void feed_links::detach(feed_machine& feed) {
     auto& e = feed.entry();
     if (const auto c = std::exchange(e.on, {}).lock()) {
         c->unbind(feed);
@@ -284,7 +282,7 @@ void feed_links::detach(core::feed_machine& feed) {
     }
 }
 
-void feed_links::unbind(core::feed_machine& feed) {
+void feed_links::unbind(feed_machine& feed) {
     host_.peer_channels().forget(feed);
     const auto c = feed.entry().on.lock();
     const auto now = host_.now();
@@ -295,61 +293,52 @@ void feed_links::unbind(core::feed_machine& feed) {
         const auto whose = terms.requester.empty() ? std::string{} : "from=" + terms.requester;
         c->session().asking().send(
             {.verb = verb::bind, .noun = terms.noun, .id = host_.draw_id(), .lease_ms = 0, .adverbs = whose},
-            core::saturating_add(now, time_limit({}, verb::bind)), now, detail::pending_ptr{new core::discarded_reply});
+            saturating_add(now, time_limit({}, verb::bind)), now, detail::pending_ptr{new discarded_reply});
+    }
+}
+
+template <class Condition, class Action>
+void feed_links::for_each(Condition concerns, Action act) {
+    std::vector<std::pair<feed_machine*, std::weak_ptr<void>>> found;
+    for (auto& feed : feeds_) {
+        if (concerns(feed)) {
+            found.emplace_back(&feed, feed.entry().handle);
+        }
+    }
+    for (const auto& [feed, handle] : found) {
+        if (const auto alive = handle.lock(); alive && feed->is_linked() && concerns(*feed)) {
+            act(*feed);
+        }
     }
 }
 
 void feed_links::on_new_incarnation(std::string_view node, bool replaced) {
     const std::string where{host_.node().peers.address_of(node).value_or(std::string_view{})};
-    struct concern {
-        core::feed_machine* feed;
-        std::weak_ptr<void> handle;
-        bool elsewhere;
-    };
-    std::vector<concern> concerned;
-    for (auto& feed : feeds_) {
-        const auto& e = feed.entry();
-        if (feed.target() == node && e.terms.at.empty()) {
-            concerned.push_back({&feed, e.handle, e.at != where});
-        }
-    }
     const auto now = host_.now();
-    for (const auto& [feed, handle, elsewhere] : concerned) {
-        const auto alive = handle.lock(); // another feed's handler may have closed this one
-        if (!alive || !feed->is_linked()) {
-            continue;
-        }
-        if (replaced && elsewhere && feed->is_bound()) {
-            detach(*feed);
-            feed->on_lost(std::string{node} + " was replaced by another instance", now);
-        }
-        feed->expedite(now);
-    }
+    for_each([&](const feed_machine& feed) { return feed.target() == node && feed.entry().terms.at.empty(); },
+             [&](feed_machine& feed) {
+                 if (replaced && feed.is_bound() && feed.entry().at != where) {
+                     detach(feed);
+                     feed.on_lost(std::string{node} + " was replaced by another instance", now);
+                 }
+                 feed.expedite(now);
+             });
 }
 
-void feed_links::unbind_where(const std::function<bool(core::feed_machine&)>& concerns, const std::string& why,
+void feed_links::unbind_where(const std::function<bool(feed_machine&)>& concerns, const std::string& why,
                               bool bind_at_once) {
-    std::vector<std::pair<core::feed_machine*, std::weak_ptr<void>>> found; // a completion may close others
-    for (auto& feed : feeds_) {
-        if (feed.is_bound() && concerns(feed)) {
-            found.emplace_back(&feed, feed.entry().handle);
-        }
-    }
-    for (const auto& [feed, handle] : found) {
-        const auto alive = handle.lock();
-        if (!alive || !feed->is_bound()) {
-            continue;
-        }
-        unbind(*feed);
-        feed->on_lost(why, host_.now());
-        if (bind_at_once) {
-            feed->expedite(host_.now());
-        }
-    }
+    for_each([&](feed_machine& feed) { return feed.is_bound() && concerns(feed); },
+             [&](feed_machine& feed) {
+                 unbind(feed);
+                 feed.on_lost(why, host_.now());
+                 if (bind_at_once) {
+                     feed.expedite(host_.now());
+                 }
+             });
 }
 
 void feed_links::on_route_lost(std::string_view node, std::string_view address) {
-    const auto concerns = [&](core::feed_machine& feed) {
+    const auto concerns = [&](feed_machine& feed) {
         const auto& e = feed.entry();
         return feed.target() == node && e.terms.at.empty() && e.at == address;
     };
@@ -357,22 +346,12 @@ void feed_links::on_route_lost(std::string_view node, std::string_view address) 
 }
 
 void feed_links::on_security_changed() {
-    unbind_where([this](core::feed_machine& feed) { return !is_permitted(feed); },
+    unbind_where([this](feed_machine& feed) { return !is_permitted(feed); },
                  host_.node().name + " may no longer bind it", false);
 }
 
 void feed_links::stop() {
-    std::vector<std::pair<core::feed_machine*, std::weak_ptr<void>>> feeds; // a completion may close others
-    for (auto& feed : feeds_) {
-        feeds.emplace_back(&feed, feed.entry().handle);
-    }
-    for (const auto& [feed, handle] : feeds) {
-        if (const auto alive = handle.lock()) {
-            // Taken out of the feed, which they may own: otherwise neither would be destroyed if the context never runs
-            // again.
-            feed->abandon().fail(host_.completions(), errc::stopped);
-        }
-    }
+    for_each([](const feed_machine&) { return true; }, [](feed_machine& feed) { feed.close(errc::stopped); });
 }
 
 } // namespace cles::core

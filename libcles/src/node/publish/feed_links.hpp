@@ -21,16 +21,16 @@ namespace cles::core {
 class local_node;
 
 /// The feeds of a service and their links: finds a link for each feed, sends its BIND, and unbinds it.
-class feed_links final : public core::feed_host {
+class feed_links final : public feed_host {
   public:
     explicit feed_links(local_node& host) noexcept : host_(host) {}
 
     /// Call once, before the feed starts. It is in the list until it is closed.
-    void enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms);
-    void bind(core::feed_machine& feed) override;
-    void unbind(core::feed_machine& feed) override;
-    void detach(core::feed_machine& feed) override;
-    void renew(core::feed_machine& feed, time_point until) override;
+    void enter(feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms);
+    void bind(feed_machine& feed) override;
+    void unbind(feed_machine& feed) override;
+    void detach(feed_machine& feed) override;
+    void renew(feed_machine& feed, time_point until) override;
     /// The node has a new incarnation: feeds that wait to bind there do so at once. `replaced`: feeds that are still
     /// bound to the previous incarnation are bound again.
     void on_new_incarnation(std::string_view node, bool replaced);
@@ -49,9 +49,11 @@ class feed_links final : public core::feed_host {
         std::optional<update_mark> mark{};
         std::string_view answer{}; ///< the failure as the peer wrote it, if it did
     };
+    /// Calls `act` for the feeds that it concerns, and still does when it is their turn: a completion may close others.
+    template <class Condition, class Action>
+    void for_each(Condition concerns, Action act);
     /// Unbinds the bound feeds that it concerns, and reports why; they bind again after a pause, or at once.
-    void unbind_where(const std::function<bool(core::feed_machine&)>& concerns, const std::string& why,
-                      bool bind_at_once);
+    void unbind_where(const std::function<bool(feed_machine&)>& concerns, const std::string& why, bool bind_at_once);
 
     /// Null: the feed or its service has been destroyed.
     using reply_function = std::function<void(local_node* host, const reply&)>;
@@ -64,19 +66,19 @@ class feed_links final : public core::feed_host {
         up_to_it,  ///< updates up to it are old: they were queued for a shared binding
     };
 
-    [[nodiscard]] detail::pending_ptr on_reply(const core::feed_machine& feed, reply_function then);
+    [[nodiscard]] detail::pending_ptr on_reply(const feed_machine& feed, reply_function then);
     /// `asked`: when the BIND was sent by datagram; empty for a stream.
-    [[nodiscard]] bool is_value_trusted(core::feed_machine& feed) const;
-    void on_bind_reply(core::feed_machine& feed, const reply& received, std::optional<time_point> asked, marking marks);
-    void send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c);
-    void ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c);
-    [[nodiscard]] protocol::outgoing_request bind_request(core::feed_machine& feed, const connection& c);
+    [[nodiscard]] bool is_value_trusted(feed_machine& feed) const;
+    void on_bind_reply(feed_machine& feed, const reply& received, std::optional<time_point> asked, marking marks);
+    void send_bind(feed_machine& feed, const std::shared_ptr<connection>& c);
+    void ask_for_features(feed_machine& feed, const std::shared_ptr<connection>& c);
+    [[nodiscard]] protocol::outgoing_request bind_request(feed_machine& feed, const connection& c);
     /// Whether the node may bind it. True without security.
-    [[nodiscard]] bool is_permitted(core::feed_machine& feed) const;
-    void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
+    [[nodiscard]] bool is_permitted(feed_machine& feed) const;
+    void refuse_later(feed_machine& feed, boost::system::error_code code, const std::string& why);
 
     local_node& host_;
-    boost::intrusive::list<core::feed_machine, boost::intrusive::constant_time_size<false>> feeds_;
+    boost::intrusive::list<feed_machine, boost::intrusive::constant_time_size<false>> feeds_;
 };
 
 } // namespace cles::core

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/publish/feed_machine.hpp"
 
-#include "node/base/deadlines.hpp"
 #include "protocol/reply_line.hpp"
-#include "protocol/request_line.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -13,7 +11,8 @@ namespace cles::core {
 feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, completion_queue& completions,
                            const limits& bounds, std::string target, std::string path, bool thinned, std::uint32_t seed)
     : subscription(std::move(target), std::move(path), thinned, bounds.publishers), host_(host), deadlines_(deadlines),
-      max_line_(bounds.line), completions_(completions), mail_(bounds, completions), backoff_(seed), jitter_(~seed) {}
+      max_line_(bounds.line), completions_(completions), mail_(bounds, completions), backoff_(seed), jitter_(~seed),
+      lease_(bounds.lease) {}
 
 void feed_machine::start(detail::pending_ptr bound) {
     first_ = std::move(bound);
@@ -59,10 +58,9 @@ void feed_machine::take_marked(const std::string& body, const update_mark& mark)
     }
 }
 
-void feed_machine::on_leased(time_point sent_at, std::chrono::milliseconds lease) {
+void feed_machine::on_leased(time_point sent_at) {
     if (state_ == state::bound) {
         bound_at_ = sent_at;
-        lease_ = lease;
         begin_lease(sent_at);
     }
 }
@@ -155,9 +153,9 @@ void feed_machine::on_deadline(time_point) {
     }
 }
 
-void feed_machine::close(errc why) { abandon().fail(completions_, why); }
-
-feed_machine::waiting feed_machine::abandon() {
+// The operations are taken out of the feed, which they may own: otherwise neither would be destroyed if the context
+// never runs again.
+void feed_machine::close(errc why) {
     if (state_ != state::closed) {
         state_ = state::closed;
         deadlines_.disarm(*this);
@@ -166,10 +164,9 @@ feed_machine::waiting feed_machine::abandon() {
             unlink();
         }
     }
-    return {.first = std::move(first_), .next = mail_.close()};
-}
-
-void feed_machine::waiting::fail(completion_queue& completions, errc why) {
+    auto& completions = completions_; // the first of the operations may destroy this
+    auto first = std::move(first_);
+    auto next = mail_.close();
     if (first != nullptr) {
         completions.fail(std::move(first), why, "the feed was closed");
     }

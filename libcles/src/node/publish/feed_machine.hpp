@@ -89,10 +89,10 @@ class feed_machine final
     /// `mark`: the update that holds the last value, if the publisher says so. If it is new, it is delivered as an
     /// update too.
     void on_bound(std::string_view last, const std::optional<update_mark>& mark = {});
-    /// Bound by datagram, with this lease. It counts from the time the BIND was sent, not from the reply, so that it
-    /// never ends at the publisher before it does here. It is renewed after a third of it, or a little earlier at
-    /// random, so that many renewals do not coincide.
-    void on_leased(time_point sent_at, std::chrono::milliseconds lease);
+    /// Bound by datagram, with a lease of `limits::lease`. It counts from the time the BIND was sent, not from the
+    /// reply, so that it never ends at the publisher before it does here. It is renewed after a third of it, or a
+    /// little earlier at random, so that many renewals do not coincide.
+    void on_leased(time_point sent_at);
     void on_renewed(time_point sent_at);
     void on_renewal_refused(time_point sent_at, boost::system::error_code why, std::string_view message,
                             time_point now);
@@ -113,16 +113,8 @@ class feed_machine final
     [[nodiscard]] const feed_entry& entry() const noexcept { return entry_; }
     /// Its events, until they are fetched.
     [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
+    /// Closes the feed: the operations that wait for it fail.
     void close(errc why);
-
-    /// The operations that wait for a feed.
-    struct waiting {
-        detail::pending_ptr first;
-        event_ptr next;
-        void fail(completion_queue& completions, errc why);
-    };
-    /// Closes the feed; the caller completes the operations.
-    [[nodiscard]] waiting abandon();
     [[nodiscard]] bool closed() const noexcept { return state_ == state::closed; }
     [[nodiscard]] bool is_bound() const noexcept override { return state_ == state::bound; }
     /// Whether it is bound, or was.
@@ -149,8 +141,8 @@ class feed_machine final
     completion_queue& completions_;
     feed_mailbox mail_;
     backoff backoff_;
-    jitter jitter_; // of renewals
-    std::chrono::milliseconds lease_{0};
+    jitter jitter_;                   // of renewals
+    std::chrono::milliseconds lease_; // limits::lease
     time_point lease_end_{};
     time_point bound_at_{}; // when the BIND was sent from which leases count
     state state_ = state::fresh;

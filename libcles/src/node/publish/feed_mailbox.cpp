@@ -4,9 +4,7 @@
 #include <cles/error.hpp>
 
 #include <algorithm>
-#include <cstddef>
 #include <iterator>
-#include <utility>
 
 namespace cles::core {
 

@@ -3,12 +3,9 @@
 
 #include <cles/error.hpp>
 
-#include "node/base/deadlines.hpp"
 #include "node/publish/multicast_group.hpp"
-#include "protocol/request_line.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace cles::core {
 namespace {
@@ -53,7 +50,7 @@ bool group_bindings::bind(const group_source& from, const protocol::request_line
     const bool known = found != nouns_.end() && leases_.contains({&found->second, from});
     if (r.unbinds()) {
         if (known) {
-            leases_.drop(std::pair{&found->second, from});
+            leases_.drop({&found->second, from});
             end(found->second, from);
         }
         return true;

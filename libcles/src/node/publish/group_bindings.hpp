@@ -6,7 +6,6 @@
 #include "node/node_state.hpp"
 #include "node/publish/binding.hpp"
 #include "port/group_port.hpp"
-#include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <boost/unordered/unordered_flat_map.hpp>
@@ -27,7 +26,7 @@ namespace cles::core {
 /// many there are.
 ///
 /// Leases of nouns that are not published yet are kept too: the first publication finds its subscribers.
-class group_bindings final : private subscriber, private publications::observer {
+class group_bindings final : private subscriber {
   public:
     /// The minimum time between two repeats of a noun's last update, and the maximum random delay of one.
     static constexpr std::chrono::milliseconds repeat_apart{250};
@@ -42,6 +41,8 @@ class group_bindings final : private subscriber, private publications::observer 
     /// Sends pending updates: the port is writable again.
     void drain(time_point now) { bound_.drain(now); }
     void clear();
+    /// The topic is new: those who have bound its noun get its updates.
+    void on_opened(topic& made);
 
   private:
     struct noun final : deadline { // armed to repeat its last update
@@ -64,8 +65,6 @@ class group_bindings final : private subscriber, private publications::observer 
     // subscriber
     [[nodiscard]] bool takes_updates() const override { return out_.unsent() == 0; }
     void put_updates(std::string_view lines) override;
-    // publications::observer
-    void on_opened(topic& made) override;
 
     node_state& node_;
     group_port& out_;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/publish/group_feeds.hpp"
 
-#include "node/base/deadlines.hpp"
 #include "node/publish/multicast_group.hpp"
 
 #include <boost/container/small_vector.hpp>

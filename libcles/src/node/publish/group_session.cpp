@@ -32,19 +32,14 @@ group_session::group_session(std::shared_ptr<node_state> host, multicast_group& 
     group_.add(*port_);
 }
 
-group_session::~group_session() {
-    withdraw_all();
-    port_->close();
-}
+group_session::~group_session() { stop(); }
 
 void group_session::stop() {
-    unbind_all();
-    port_->close();
-}
-
-void group_session::unbind_all() {
-    withdraw_all();
+    for (const auto& [key, each] : std::exchange(waiting_, {})) {
+        each.handler->withdraw();
+    }
     bindings_.clear();
+    port_->close();
 }
 
 void group_session::on_writable() {
@@ -143,12 +138,6 @@ bool group_session::ask(const group_source& from, const identity& peer, const pr
 void group_session::withdraw(const group_source& from, const protocol::request_line& bind) {
     if (const auto gone = waiting_.extract(key_of(from, bind)); !gone.empty()) {
         gone.mapped().handler->withdraw();
-    }
-}
-
-void group_session::withdraw_all() {
-    for (const auto& [key, each] : std::exchange(waiting_, {})) {
-        each.handler->withdraw();
     }
 }
 

@@ -37,12 +37,10 @@ class group_session final : public group_listener {
 
     /// Starts to receive. Call once.
     void start() { port_->start(*this); }
-    /// Leaves the group. Idempotent.
+    /// Ends all bindings, including those that wait for a decision, and leaves the group. Idempotent.
     void stop();
     /// What others have bound here.
     [[nodiscard]] group_bindings& bindings() noexcept { return bindings_; }
-    /// Ends all bindings, including those that wait for a decision.
-    void unbind_all();
 
     void on_datagram(const group_datagram& datagram) override;
     void on_writable() override;
@@ -60,7 +58,6 @@ class group_session final : public group_listener {
     bool bind_noun(const group_datagram& datagram, const protocol::request_line& bind, time_point now);
     bool ask(const group_source& from, const identity& peer, const protocol::request_line& bind, time_point now);
     void withdraw(const group_source& from, const protocol::request_line& bind);
-    void withdraw_all();
 
     std::shared_ptr<node_state> node_;
     multicast_group& group_;

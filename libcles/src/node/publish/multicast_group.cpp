@@ -7,7 +7,6 @@
 #include "node/security_protocol.hpp"
 #include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
-#include "protocol/request_line.hpp"
 
 #include <boost/system/errc.hpp>
 

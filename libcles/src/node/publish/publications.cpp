@@ -5,14 +5,12 @@
 #include <cles/error.hpp>
 
 #include "node/base/scoped_flag.hpp"
+#include "node/publish/group_bindings.hpp"
 #include "node/session/reply_writer.hpp"
 #include "node/session/task_execution.hpp"
 #include "port/node_security.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
-
-#include <algorithm>
-#include <utility>
 
 namespace cles::core {
 namespace {
@@ -22,9 +20,10 @@ std::string_view task_of(std::string_view path) { return path.substr(0, path.fin
 } // namespace
 
 publications::publications(topic_context shared, const cles::limits& bounds, completion_queue& completions,
-                           std::string publisher, std::string epoch, unsent_topics& unsent)
+                           std::string publisher, std::string epoch, unsent_topics& unsent,
+                           const task_registry* registered, const node_security* security)
     : shared_(std::move(shared)), bounds_(bounds), completions_(completions), publisher_(std::move(publisher)),
-      epoch_(std::move(epoch)), unsent_(unsent) {}
+      epoch_(std::move(epoch)), unsent_(unsent), registered_(registered), security_(security) {}
 
 topic* publications::find(std::string_view path) noexcept {
     if (recent_ != nullptr && recent_->path() == path) {
@@ -69,7 +68,7 @@ topic& publications::open(std::string_view path, bool to_publish) {
     auto made = std::make_unique<topic>(shared_, std::string{path}, highest_retired_, nouns.get());
     auto& result = *made;
     topics_.emplace(std::string{path}, std::move(made));
-    for (auto* const each : observers_) { // no observer changes the list
+    for (auto* const each : watching_) { // none changes the list
         each->on_opened(result);
     }
     return result;

@@ -21,6 +21,7 @@
 
 namespace cles::core {
 
+class group_bindings;
 class node_security;
 class task_registry;
 
@@ -78,15 +79,12 @@ struct task_nouns {
 /// nobody is bound to, least recently used first.
 class publications final : public topic_source {
   public:
+    /// Updates of tasks that are `registered` as signed are; without `security`, they are refused with `denied`. What
+    /// these refer to must outlive this.
     [[gnu::cold]] publications(topic_context shared, const cles::limits& bounds, completion_queue& completions,
-                               std::string publisher, std::string epoch, unsent_topics& unsent);
+                               std::string publisher, std::string epoch, unsent_topics& unsent,
+                               const task_registry* registered = nullptr, const node_security* security = nullptr);
 
-    /// From now on, updates of tasks that are registered as signed are; without `security`, they are refused with
-    /// `denied`. Both must outlive this.
-    void sign_for(const task_registry& tasks, const node_security* security) noexcept {
-        registered_ = &tasks;
-        security_ = security;
-    }
     /// Publishes what `write` writes (a body, or a scalar, which is wrapped). The path is canonical.
     /// \throws cles::error: `too_large`, `busy`, `failed`, `denied`; what `write` throws. Then nothing is published,
     /// but nouns may have retired.
@@ -101,21 +99,10 @@ class publications final : public topic_source {
     /// none with this ticket waits.
     [[gnu::cold]] bool cancel(std::uint64_t ticket);
 
-    /// Notified of each new topic, before anything is published there.
-    class observer {
-      public:
-        observer() = default;
-        observer(const observer&) = delete;
-        observer& operator=(const observer&) = delete;
-        virtual void on_opened(topic& made) = 0;
-
-      protected:
-        ~observer() = default;
-    };
-    /// The observer must live until it is removed.
-    void watch(observer& who) { observers_.push_back(&who); }
+    /// Notifies it of each new topic, before anything is published there. It must live until it is removed.
+    void watch(group_bindings& who) { watching_.push_back(&who); }
     /// Does nothing if it is not registered.
-    void unwatch(observer& who) { std::erase(observers_, &who); }
+    void unwatch(group_bindings& who) { std::erase(watching_, &who); }
 
     /// The topic, or null.
     [[nodiscard]] topic* find(std::string_view path) noexcept override;
@@ -169,13 +156,13 @@ class publications final : public topic_source {
     std::string publisher_;
     std::string epoch_;
     unsent_topics& unsent_;
-    std::vector<observer*> observers_;
+    std::vector<group_bindings*> watching_;
     string_map<std::unique_ptr<task_nouns>> nouns_; // per task
     string_map<std::unique_ptr<topic>> topics_;
     std::uint64_t highest_retired_ = 0; // the highest `seq` of all nouns that were removed
     bool lossless_ = false;
-    const task_registry* registered_ = nullptr;
-    const node_security* security_ = nullptr;
+    const task_registry* registered_;
+    const node_security* security_;
     topic* recent_ = nullptr; // usually the same noun is published again
 };
 

@@ -17,25 +17,22 @@ bool overlap(std::string_view a, std::string_view b) noexcept {
 
 // -- which updates are new -------------------------------------------------------------------------------------------
 
-sequence_tracker::verdict sequence_tracker::take(std::uint32_t epoch, std::uint64_t seq) noexcept {
+std::optional<std::uint64_t> sequence_tracker::take(std::uint32_t epoch, std::uint64_t seq) noexcept {
     if (epoch_ == epoch) {
         if (seq <= seq_) {
-            return {};
+            return std::nullopt;
         }
-        const auto missed = seq - seq_ - 1;
-        seq_ = seq;
-        return {.is_new = true, .missed = missed};
+        return seq - std::exchange(seq_, seq) - 1;
     }
     if (std::ranges::find(previous_epochs_, std::optional{epoch}) != previous_epochs_.end()) {
-        return {};
+        return std::nullopt;
     }
-    const bool restarted = epoch_.has_value();
-    if (restarted) {
+    if (epoch_) {
         previous_epochs_[next_previous_++ % previous_epochs_.size()] = epoch_;
     }
     epoch_ = epoch;
     seq_ = seq;
-    return {.is_new = true, .restarted = restarted};
+    return 0;
 }
 
 sequence_tracker& publisher_sequences::of(std::string_view publisher) {
@@ -59,8 +56,8 @@ void publisher_sequences::forget(std::string_view publisher) {
 bool subscription::take(const protocol::request_line& update, feed_mailbox::hand_over when) {
     auto& order = each_ ? each_->of(update.noun.target) : order_;
     const auto before = order;
-    const auto found = order.take(*update.epoch, *update.seq);
-    if (!found.is_new) {
+    const auto missed = order.take(*update.epoch, *update.seq);
+    if (!missed) {
         return false;
     }
     detail::raw_event event{.body = update.body.empty() ? std::string_view{"{}"} : update.body,
@@ -69,13 +66,12 @@ bool subscription::take(const protocol::request_line& update, feed_mailbox::hand
                             .line = update.text,
                             .reading = update.reading};
     bool taken = true;
-    if (found.missed != 0 && !thinned_) {
+    if (*missed != 0 && !thinned_) {
         event.checked = event.has_json();
         taken = event.checked;
         if (taken) {
-            on_event(
-                {.kind = feed_event::gap, .publisher = update.noun.target, .seq = *update.seq, .missed = found.missed},
-                when);
+            on_event({.kind = feed_event::gap, .publisher = update.noun.target, .seq = *update.seq, .missed = *missed},
+                     when);
         }
     }
     // After delivery, `order` may be gone: the handler may have closed the feed.

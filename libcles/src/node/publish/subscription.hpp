@@ -26,13 +26,8 @@ namespace cles::core {
 /// Determines from `seq` and `epoch` which updates of a noun are new to a subscriber, and how many it has missed.
 class sequence_tracker {
   public:
-    struct verdict {
-        bool is_new = false;      ///< false: old or repeated
-        bool restarted = false;   ///< the publisher has a new incarnation
-        std::uint64_t missed = 0; ///< updates between the last one and this one
-    };
-
-    verdict take(std::uint32_t epoch, std::uint64_t seq) noexcept;
+    /// How many updates are missing between the last one and this one; nothing if this one is old or repeated.
+    std::optional<std::uint64_t> take(std::uint32_t epoch, std::uint64_t seq) noexcept;
 
   private:
     std::optional<std::uint32_t> epoch_;

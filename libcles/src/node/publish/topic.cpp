@@ -2,7 +2,6 @@
 #include "node/publish/topic.hpp"
 
 #include "protocol/line.hpp"
-#include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
@@ -10,23 +9,18 @@
 
 namespace cles::core {
 
-std::string& update_log::begin() {
-    begun_ = text_.size();
-    return text_;
-}
-
 void update_log::commit() {
     text_.push_back('\n');
     ends_.push_back(text_.size());
 }
 
-void update_log::roll_back() { text_.resize(begun_); }
+void update_log::roll_back() { text_.resize(start_of(last() + 1)); }
 
-std::string_view update_log::pending() const noexcept { return std::string_view{text_}.substr(begun_); }
+std::string_view update_log::pending() const noexcept { return std::string_view{text_}.substr(start_of(last() + 1)); }
 
 std::size_t update_log::start_of(std::uint64_t number) const noexcept {
-    const auto index = static_cast<std::size_t>(number - first_);
-    return index == 0 ? text_head_ : ends_[head_ + index - 1];
+    const auto index = head_ + static_cast<std::size_t>(number - first_);
+    return index == 0 ? 0 : ends_[index - 1];
 }
 
 std::string_view update_log::lines(std::uint64_t from, std::uint64_t to) const noexcept {
@@ -45,11 +39,11 @@ void update_log::forget_before(std::uint64_t from) {
     if (from <= first_) {
         return;
     }
-    text_head_ = start_of(from);
     head_ += static_cast<std::size_t>(from - first_);
     first_ = from;
     // Forgotten text is removed once it is no shorter than the rest, which keeps the cost per line constant.
-    if (text_head_ > 4096 && text_head_ >= text_.size() - text_head_) {
+    const auto forgotten = start_of(first_);
+    if (forgotten > 4096 && forgotten >= text_.size() - forgotten) {
         compact();
         constexpr std::size_t roomy = 65536;
         if (text_.capacity() > roomy && text_.size() < text_.capacity() / 8) {
@@ -59,13 +53,12 @@ void update_log::forget_before(std::uint64_t from) {
 }
 
 void update_log::compact() {
-    text_.erase(0, text_head_);
+    const auto forgotten = start_of(first_);
+    text_.erase(0, forgotten);
     ends_.erase(ends_.begin(), ends_.begin() + static_cast<std::ptrdiff_t>(head_));
     for (auto& end : ends_) {
-        end -= text_head_;
+        end -= forgotten;
     }
-    begun_ -= std::min(begun_, text_head_);
-    text_head_ = 0;
     head_ = 0;
 }
 
@@ -73,7 +66,7 @@ void update_log::clear() noexcept {
     first_ = last() + 1;
     std::string{}.swap(text_); // assigning {} would keep their memory
     std::vector<std::size_t>{}.swap(ends_);
-    text_head_ = head_ = begun_ = 0;
+    head_ = 0;
 }
 
 void update_log::fit() {
@@ -109,7 +102,6 @@ std::string_view topic::last_line() const noexcept {
 
 void topic::commit(std::size_t body_at) {
     log_.commit();
-    begun_ = false;
     has_value_ = true;
     last_body_at_ = body_at;
     ++shared_.counts.updates_published;
@@ -129,7 +121,6 @@ void topic::commit(std::size_t body_at) {
 
 void topic::roll_back() {
     log_.roll_back();
-    begun_ = false;
     if (log_.memory() > held_.size()) {
         log_.fit();
         held_.resize(log_.memory());

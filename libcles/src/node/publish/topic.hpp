@@ -33,10 +33,10 @@ class update_log {
     explicit update_log(std::uint64_t last = 0) noexcept : first_(last + 1) {}
 
     /// Starts a line: append it to the string, without its LF, then call `commit` or `roll_back`.
-    std::string& begin();
+    std::string& begin() noexcept { return text_; }
     void commit();
     [[gnu::cold]] void roll_back();
-    /// What has been appended since `begin`.
+    /// The line being written, so far.
     [[nodiscard]] std::string_view pending() const noexcept;
 
     /// The number of the newest line; at first, the constructor's `last`.
@@ -66,11 +66,9 @@ class update_log {
     [[nodiscard]] std::size_t start_of(std::uint64_t number) const noexcept;
 
     std::string text_;
-    std::size_t text_head_ = 0;     // where the oldest line kept starts
     std::vector<std::size_t> ends_; // where each line ends in `text_`
-    std::size_t head_ = 0;          // the index of its end in `ends_`
+    std::size_t head_ = 0;          // the index of the oldest line kept
     std::uint64_t first_ = 1;
-    std::size_t begun_ = 0;
 };
 
 /// What the topics of a node share.
@@ -108,11 +106,8 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
 
     /// Starts the next update: append the line to the returned string, then call `commit` (with the position of the
     /// body in the line) or `roll_back`.
-    std::string& begin() {
-        begun_ = true;
-        return log_.begin();
-    }
-    [[nodiscard]] bool is_begun() const noexcept { return begun_; }
+    std::string& begin() noexcept { return log_.begin(); }
+    [[nodiscard]] bool is_begun() const noexcept { return !pending().empty(); }
     [[nodiscard]] std::string_view pending() const noexcept { return log_.pending(); }
     /// Completes the line, which becomes the last update.
     void commit(std::size_t body_at);
@@ -154,7 +149,6 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     std::string path_;
     update_log log_;
     memory_reservation held_;
-    bool begun_ = false;
     bool has_value_ = false;
     bool unthinned_ = false; // some binding takes every update
     std::size_t last_body_at_ = 0;

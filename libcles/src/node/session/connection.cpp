@@ -393,7 +393,7 @@ void connection::end(std::string_view why) {
         monitor_->stop();
     }
     held_output_.resize(0);
-    host_->forget(*this, link_->received(), link_->sent());
+    host_->connections().forget(*this, link_->received(), link_->sent());
     lose_feeds(why);
     session_.on_lost(why);
     now_.reset();

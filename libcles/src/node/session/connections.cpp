@@ -120,14 +120,14 @@ std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin
     auto c = std::make_shared<connection>(host_.shared_from_this(), std::move(made), from, ++last_number_);
     open_.emplace(c->number(), c);
     if (counted) {
-        if (c->datagram() != 0) {
+        if (c->is_datagram()) {
             ++sources_;
         } else {
             admission_.enter(c->monitor(), address);
         }
     }
     ++host_.node().counts.links_open;
-    if (from == connection::origin::dialled && c->datagram() == 0) {
+    if (from == connection::origin::dialled && !c->is_datagram()) {
         c->session().expect_refusal();
     }
     if (host_.closing()) {
@@ -155,7 +155,7 @@ void connections::on_security_changed() {
                            peer.address);
             c->abandon(peer.name + " is no longer a member of the fleet");
         } else if (auto& serving = c->session().serving(); !serving.are_bindings_permitted()) {
-            if (c->datagram() != 0) { // the peer would not notice, and copies of its requests would run again
+            if (c->is_datagram()) { // the peer would not notice, and copies of its requests would run again
                 serving.drop_forbidden_bindings();
                 host_.post_log(log_level::info,
                                peer.name + " may no longer bind what it has bound: ended these bindings", peer.address);
@@ -170,12 +170,12 @@ void connections::on_security_changed() {
     }
 }
 
-bool connections::forget(connection& c, std::uint64_t received, std::uint64_t sent) {
+void connections::forget(connection& c, std::uint64_t received, std::uint64_t sent) {
     if (open_.erase(c.number()) == 0) {
-        return false;
+        return;
     }
     if (c.from() == connection::origin::accepted) {
-        if (c.datagram() != 0) {
+        if (c.is_datagram()) {
             --sources_;
         } else {
             admission_.leave(c.monitor());
@@ -186,17 +186,11 @@ bool connections::forget(connection& c, std::uint64_t received, std::uint64_t se
     ++counts.links_lost;
     counts.bytes_received += received;
     counts.bytes_sent += sent;
-    return true;
+    host_.peer_channels().drop(c);
 }
 
 bool connections::cancel(std::uint64_t id) {
-    for (const auto& [key, c] : open_) {
-        const auto held = c;
-        if (held->session().asking().cancel(id)) {
-            return true;
-        }
-    }
-    return false;
+    return std::ranges::any_of(open_, [id](const auto& each) { return each.second->session().asking().cancel(id); });
 }
 
 std::vector<std::shared_ptr<connection>> connections::all() const {
@@ -236,7 +230,7 @@ void graceful_shutdown::end_links() {
     }
     bool open = false;
     for (const auto& c : host_.connections().all()) {
-        if (c->datagram() == 0) {
+        if (!c->is_datagram()) {
             c->session().send_leave_notice();
             open = true;
         } else {

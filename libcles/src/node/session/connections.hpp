@@ -60,8 +60,8 @@ class connections {
     /// The roster or the rules have changed: closes the connections of those that are no longer members, and those with
     /// bindings that are no longer permitted. States the new roster on the others.
     void on_security_changed();
-    /// Returns false if it does not own the connection (any more).
-    bool forget(connection& c, std::uint64_t received, std::uint64_t sent);
+    /// The connection has ended. Does nothing if it is not there (any more).
+    void forget(connection& c, std::uint64_t received, std::uint64_t sent);
     /// Cancels a request that waits for its reply. False if there is none with that id.
     bool cancel(std::uint64_t id);
     [[nodiscard]] std::vector<std::shared_ptr<connection>> all() const;

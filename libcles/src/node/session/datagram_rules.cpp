@@ -93,43 +93,39 @@ void dedup::on_deadline(time_point now) {
     }
 }
 
-datagram_requests::datagram_requests(node_state& host, line_sink& out, reply_writer& replies)
-    : node_(host), out_(out), replies_(replies), seen_(host.deadlines, host.remembered) {
-    replies_.remember(seen_);
-}
-
-bool datagram_requests::admit(const protocol::request_line& r) {
+bool admit_datagram(const protocol::request_line& r, dedup& seen, node_state& host, line_sink& out,
+                    reply_writer& replies) {
     // A copy of a signed PULL must neither run again nor get another challenge.
-    const auto* const task = node_.secured ? node_.tasks.find(r.verb, r.noun.task) : nullptr;
+    const auto* const task = host.secured ? host.tasks.find(r.verb, r.noun.task) : nullptr;
     const bool is_signed = task != nullptr && task->info.must_be_signed;
     const bool needs_id = r.verb != verb::bind && (r.verb != verb::pull || is_signed);
     if (r.id == 0) {
         if (needs_id) {
-            replies_.fail(r, errc::bad_request,
-                          node_.name + ": by datagram, " + std::string{to_string(r.verb)} + " needs an 'id'");
+            replies.fail(r, errc::bad_request,
+                         host.name + ": by datagram, " + std::string{to_string(r.verb)} + " needs an 'id'");
         }
         return !needs_id;
     }
-    switch (seen_.look(r.id, r.text)) {
+    switch (seen.look(r.id, r.text)) {
     case dedup::verdict::fresh: break;
-    case dedup::verdict::running: ++node_.counts.requests_repeated; return false;
+    case dedup::verdict::running: ++host.counts.requests_repeated; return false;
     case dedup::verdict::answered:
-        ++node_.counts.requests_repeated;
-        out_.output().append(seen_.reply(r.id, r.text));
+        ++host.counts.requests_repeated;
+        out.output().append(seen.reply(r.id, r.text));
         return false;
     case dedup::verdict::clash:
         reply_target where{r};
         where.apart = true;
-        replies_.fail(
+        replies.fail(
             where, {.code = errc::bad_request,
-                    .message = node_.name + ": the id " + std::to_string(r.id) + " is in flight with another request"});
+                    .message = host.name + ": the id " + std::to_string(r.id) + " is in flight with another request"});
         return false;
     }
     // A cancellation may be repeated, and takes effect even if no memory is left.
-    if (needs_id && r.noun.task != "cles" && !seen_.begin(r.id, r.text, out_.datagram())) {
-        replies_.fail(r, {.code = errc::busy,
-                          .message = node_.name + " has reached its limit of requests by datagram",
-                          .retry_ms = 1000});
+    if (needs_id && r.noun.task != "cles" && !seen.begin(r.id, r.text, out.datagram())) {
+        replies.fail(r, {.code = errc::busy,
+                         .message = host.name + " has reached its limit of requests by datagram",
+                         .retry_ms = 1000});
         return false;
     }
     return true;

@@ -91,24 +91,10 @@ class dedup final : private deadline {
     std::deque<done> done_; // in order of expiry
 };
 
-/// Filters requests that arrive by datagram: those that must not run twice need an id, and repeats are recognised.
-class datagram_requests {
-  public:
-    [[gnu::cold]] datagram_requests(node_state& host, line_sink& out, reply_writer& replies);
-
-    /// Whether the request is to be served. False if it has been handled: refused, or recognised as a repeat.
-    bool admit(const protocol::request_line& request);
-    /// Records a request that may be repeated, and that takes time to answer.
-    void add_repeatable(const protocol::request_line& request) { seen_.add_repeatable(request.id, request.text); }
-    /// Whether nothing is remembered.
-    [[nodiscard]] bool empty() const noexcept { return seen_.empty(); }
-
-  private:
-    node_state& node_;
-    line_sink& out_;
-    reply_writer& replies_;
-    dedup seen_;
-};
+/// Whether a request that has arrived by datagram is to be served: those that must not run twice need an id, and
+/// repeats are recognised. False if it has been handled: refused, or recognised.
+bool admit_datagram(const protocol::request_line& request, dedup& seen, node_state& host, line_sink& out,
+                    reply_writer& replies);
 
 /// Limits what a node sends to an unverified address to less than 64 KiB in any second, so that a forged source address
 /// cannot be used to flood its owner.

@@ -15,8 +15,9 @@ namespace cles::core {
 inbound::inbound(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer)
     : node_(std::move(host)), out_(out), peer_(peer), memory_(out.memory()), ordered_(*node_, out, memory_),
       replies_(*node_, out), bound_(node_, out, updates, peer, replies_) {
-    if (out_.datagram() != 0) {
-        datagrams_.emplace(*node_, out_, replies_);
+    if (out_.is_datagram()) {
+        seen_.emplace(node_->deadlines, node_->remembered);
+        replies_.remember(*seen_);
     }
 }
 
@@ -26,7 +27,7 @@ void inbound::on_request(std::string_view line, const protocol::request_line& r,
     if (ending_) {
         return;
     }
-    if (datagrams_ && !datagrams_->admit(r)) {
+    if (seen_ && !admit_datagram(r, *seen_, *node_, out_, replies_)) {
         return;
     }
     ++(is_housekeeping(r) ? node_->counts.housekeeping : node_->counts.requests[static_cast<std::size_t>(r.verb)]);
@@ -65,7 +66,7 @@ void inbound::on_malformed(const protocol::malformed_request& what) {
         return;
     }
     refuse_in_turn(reply_target{what}, {.code = errc::bad_request, .message = node_->name + ": " + what.why});
-    if (!datagrams_ && what.id != 0 && calls_.contains(what.id)) {
+    if (!seen_ && what.id != 0 && calls_.contains(what.id)) {
         break_off();
     }
 }
@@ -75,7 +76,7 @@ void inbound::on_overlong(std::string_view head) {
         return;
     }
     refuse_in_turn(reply_target{protocol::salvage(head)}, overlong(*node_, out_.datagram()));
-    if (!datagrams_) { // datagrams are independent of each other
+    if (!seen_) { // datagrams are independent of each other
         closing_ = true;
         end();
     }
@@ -277,8 +278,8 @@ void inbound::keep(const protocol::request_line& r, const std::shared_ptr<call>&
         ordered_.set_running(c);
         return;
     }
-    if (datagrams_ && (r.verb == verb::pull || r.verb == verb::bind)) {
-        datagrams_->add_repeatable(r);
+    if (seen_ && (r.verb == verb::pull || r.verb == verb::bind)) {
+        seen_->add_repeatable(r.id, r.text);
     }
     calls_.emplace(r.id, c);
 }

@@ -57,7 +57,7 @@ class inbound final : private task_sink {
     [[nodiscard]] std::size_t in_flight() const noexcept { return calls_.size() + ordered_.size(); }
     /// Whether no state is kept for the peer: no running or waiting request, no binding, no remembered reply.
     [[nodiscard]] bool is_idle() const noexcept {
-        return in_flight() == 0 && bound_.empty() && (!datagrams_ || datagrams_->empty());
+        return in_flight() == 0 && bound_.empty() && (!seen_ || seen_->empty());
     }
     [[nodiscard]] std::size_t bindings() const noexcept { return bound_.size(); }
     /// Whether all bindings are still permitted. True without security.
@@ -103,7 +103,7 @@ class inbound final : private task_sink {
     std::shared_ptr<memory_account> memory_; // null: not counted
     ordered_requests ordered_;               // those without an id
     reply_writer replies_;
-    std::optional<datagram_requests> datagrams_; // only for datagrams
+    std::optional<dedup> seen_; // only over datagrams
     bind_requests bound_;
     std::string decoded_;  // scratch space for the parameters of the noun being served
     bool ending_ = false;  // the peer sends no more, or its input is no longer read

@@ -24,6 +24,7 @@ class line_sink {
     virtual std::string& urgent_output() { return output(); }
     /// The maximum size in bytes of a datagram, which holds one line with its LF; 0 for a stream.
     [[nodiscard]] virtual std::size_t datagram() const noexcept { return 0; }
+    [[nodiscard]] bool is_datagram() const noexcept { return datagram() != 0; }
     /// Output was appended outside a callback of the link: it must be sent soon.
     virtual void wake() = 0;
     /// The account for memory held on the peer's behalf; null if it is not counted.

@@ -12,20 +12,19 @@ std::chrono::milliseconds first_probe(const limits& bounds) {
     return std::clamp(bounds.probe, std::chrono::milliseconds{1}, max_wait);
 }
 
-/// Keeps the candidate with the earliest time.
-class earliest {
-  public:
-    void offer(link_monitor& m, time_point at) noexcept {
-        if (found == nullptr || at < at_) {
-            found = &m;
-            at_ = at;
+/// The link with the earliest of these times; null if none has one.
+template <class Time>
+link_monitor* earliest(const std::vector<link_monitor*>& links, Time time_of) {
+    link_monitor* found = nullptr;
+    std::optional<time_point> first;
+    for (auto* m : links) {
+        if (const std::optional<time_point> at = time_of(*m); at && (!first || *at < *first)) {
+            found = m;
+            first = at;
         }
     }
-    link_monitor* found = nullptr;
-
-  private:
-    time_point at_{};
-};
+    return found;
+}
 
 } // namespace
 
@@ -99,61 +98,46 @@ void link_admission::leave(link_monitor& m) {
     }
 }
 
-std::size_t link_admission::share() const noexcept {
-    return bounds_.links_per_address != 0 ? bounds_.links_per_address : bounds_.links - bounds_.links / 4;
-}
-
 link_admission::candidates link_admission::search(time_point now) {
     if (now < search_again_) {
         return {};
     }
-    earliest half_closed;
-    earliest silent;
-    earliest idle;
-    for (auto* m : links_) {
-        if (m->half_closed_at_) {
-            half_closed.offer(*m, *m->half_closed_at_);
-        } else if (!m->has_received_) {
-            if (now - m->opened_ >= first_line_grace) {
-                silent.offer(*m, m->opened_);
-            }
-        } else if (now - m->last_line_ >= idle_for && m->owner_.is_idle()) {
-            idle.offer(*m, m->last_line_);
-        }
+    auto* first = earliest(links_, [](const link_monitor& m) { return m.half_closed_at_; });
+    if (first == nullptr) {
+        first = earliest(links_, [now](const link_monitor& m) {
+            return !m.has_received_ && now - m.opened_ >= first_line_grace ? std::optional{m.opened_} : std::nullopt;
+        });
     }
-    auto* first = half_closed.found != nullptr ? half_closed.found : silent.found;
-    if (first == nullptr && idle.found == nullptr) {
+    auto* idle = earliest(links_, [now](const link_monitor& m) {
+        return m.has_received_ && now - m.last_line_ >= idle_for && m.owner_.is_idle() ? std::optional{m.last_line_}
+                                                                                       : std::nullopt;
+    });
+    if (first == nullptr && idle == nullptr) {
         search_again_ = now + search_pause;
     }
-    return {first, idle.found};
+    return {first, idle};
 }
 
 link_monitor* link_admission::link_of_largest_holder(std::string_view newcomer) const {
-    std::string_view greediest;
-    auto most = share();
-    for (const auto& [address, count] : per_address_) {
-        if (count > most) {
-            greediest = address;
-            most = count;
-        }
-    }
-    if (greediest.empty() || greediest == newcomer) {
+    const auto share = bounds_.links_per_address != 0 ? bounds_.links_per_address : bounds_.links - bounds_.links / 4;
+    const auto largest = std::max_element(per_address_.begin(), per_address_.end(),
+                                          [](const auto& a, const auto& b) { return a.second < b.second; });
+    if (largest == per_address_.end() || largest->second <= share || largest->first == newcomer) {
         return nullptr;
     }
-    earliest idle;
+    const std::string_view greediest = largest->first;
+    if (auto* idle = earliest(links_, [greediest](const link_monitor& m) {
+            return m.address_ == greediest && m.owner_.is_idle() ? std::optional{m.last_line_} : std::nullopt;
+        })) {
+        return idle;
+    }
     link_monitor* newest = nullptr;
     for (auto* m : links_) {
-        if (m->address_ != greediest) {
-            continue;
-        }
-        if (m->owner_.is_idle()) {
-            idle.offer(*m, m->last_line_);
-        }
-        if (newest == nullptr || m->opened_ >= newest->opened_) {
+        if (m->address_ == greediest && (newest == nullptr || m->opened_ >= newest->opened_)) {
             newest = m;
         }
     }
-    return idle.found != nullptr ? idle.found : newest;
+    return newest;
 }
 
 } // namespace cles::core

@@ -121,7 +121,6 @@ class link_admission {
         link_monitor* first = nullptr; ///< half-closed, or without a line
         link_monitor* idle = nullptr;
     };
-    [[nodiscard]] std::size_t share() const noexcept;
     candidates search(time_point now);
     [[nodiscard]] link_monitor* link_of_largest_holder(std::string_view newcomer) const;
 

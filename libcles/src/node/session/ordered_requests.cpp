@@ -4,8 +4,6 @@
 #include "node/base/scoped_flag.hpp"
 #include "protocol/reply_line.hpp"
 
-#include <utility>
-
 namespace cles::core {
 namespace {
 

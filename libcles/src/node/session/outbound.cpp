@@ -39,7 +39,7 @@ void outbound::send(protocol::outgoing_request request, time_point deadline, tim
     if (e->refused) {
         out.resize(line);
         node_.deadlines.arm(*e, now); // fails later: no operation completes inside its initiation
-    } else if (is_datagram()) {
+    } else if (out_.is_datagram()) {
         e->copies.emplace(out.substr(line), now, deadline,
                           static_cast<std::uint32_t>((e->id + first_id_) * 2654435761U));
         node_.deadlines.arm(*e, e->copies->next());
@@ -58,13 +58,14 @@ bool outbound::has_memory_for(const protocol::outgoing_request& r) {
 }
 
 // The limit holds on a stream too: the peer would close the link, and cancel the other requests on it.
-std::size_t outbound::longest() const noexcept { return is_datagram() ? out_.datagram() : node_.bounds.line + 1; }
+std::size_t outbound::longest() const noexcept { return out_.is_datagram() ? out_.datagram() : node_.bounds.line + 1; }
 
 void outbound::on_due(entry& e, time_point now) {
     if (e.refused == errc::too_large) {
         fail(e.id, errc::too_large,
-             is_datagram() ? "a request by datagram has at most " + std::to_string(out_.datagram()) + " bytes: use TCP"
-                           : "a request has at most " + std::to_string(node_.bounds.line) + " bytes");
+             out_.is_datagram()
+                 ? "a request by datagram has at most " + std::to_string(out_.datagram()) + " bytes: use TCP"
+                 : "a request has at most " + std::to_string(node_.bounds.line) + " bytes");
     } else if (e.refused) {
         fail(e.id, errc::busy, "no memory is left for requests that are not sent yet (limits.memory)");
     } else if (e.copies && !e.copies->over(now)) {
@@ -135,7 +136,7 @@ bool outbound::cancel(std::uint64_t id) {
         return false;
     }
     const auto noun = "self:cles/cancel/" + std::to_string(id + first_id_);
-    if (is_datagram()) { // it may be lost
+    if (out_.is_datagram()) { // it may be lost
         const auto now = node_.time.now();
         send({.verb = verb::push, .noun = noun, .id = node_.next_id++},
              now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,

@@ -42,7 +42,7 @@ class outbound {
     using progress_function = std::function<void(double, std::string_view)>;
 
     outbound(node_state& host, line_sink& out) noexcept
-        : node_(host), out_(out), first_id_(out.datagram() == 0 ? 0 : host.first_datagram_id) {}
+        : node_(host), out_(out), first_id_(out.is_datagram() ? host.first_datagram_id : 0) {}
     outbound(const outbound&) = delete;
     outbound& operator=(const outbound&) = delete;
 
@@ -84,7 +84,6 @@ class outbound {
         std::optional<errc> refused;          // why it was not sent
     };
 
-    [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
     /// The maximum size of a request, with its LF.
     [[nodiscard]] std::size_t longest() const noexcept;
     [[nodiscard]] bool has_memory_for(const protocol::outgoing_request& request);

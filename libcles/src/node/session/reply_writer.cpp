@@ -35,7 +35,7 @@ std::optional<protocol::failure> close_result(std::string& out, std::size_t star
 
 reply_writer::reply_writer(node_state& host, line_sink& out) noexcept
     : node_(host), out_(out),
-      max_reply_(out.datagram() == 0 ? host.bounds.line : std::min(host.bounds.line, out.datagram() - 1)) {}
+      max_reply_(out.is_datagram() ? std::min(host.bounds.line, out.datagram() - 1) : host.bounds.line) {}
 
 void reply_writer::note(reply_target where, std::string_view reply, std::string_view outcome) {
     if (where.span != 0 && node_.spans) {
@@ -64,7 +64,7 @@ void reply_writer::send(reply_target where, std::string& text, std::size_t body)
         fail(where,
              {.code = errc::too_large,
               .message = node_.name + ": the answer has " + std::to_string(text.size()) + " bytes, the limit is " +
-                         std::to_string(max_reply_) + (out_.datagram() == 0 ? "" : " by datagram: use TCP"),
+                         std::to_string(max_reply_) + (out_.is_datagram() ? " by datagram: use TCP" : ""),
               .ran = true});
     } else if (where.wanted && text.size() > always_fits && !where.reserved && !out_.reserve(text.size() + 1)) {
         fail(where, {.code = errc::busy,

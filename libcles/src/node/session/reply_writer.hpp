@@ -33,10 +33,8 @@ inline void close_body(std::string& out, std::size_t start) {
 /// Whether nodes send this request to each other on their own, for membership, task discovery and sharing: `cles`,
 /// `cles/peers` and `cles/slots`. It is counted separately from the requests of programs.
 inline bool is_housekeeping(const protocol::request_line& r) noexcept {
-    const auto& noun = r.noun;
-    return noun.task == "cles" &&
-           (noun.parameters.empty() ||
-            (noun.parameters.size() == 1 && (noun.parameters[0] == "peers" || noun.parameters[0] == "slots")));
+    const auto path = r.noun.path;
+    return path == "cles" || path == "cles/peers" || path == "cles/slots";
 }
 
 /// The request that a reply is for, and how the reply is sent.

@@ -183,20 +183,20 @@ void write_metrics(json_writer& w, const node_state& n) {
 
 void serve_reserved(node_state& host, reply_writer& replies, const protocol::request_line& r, const identity& peer) {
     const auto& parameters = r.noun.parameters;
-    if (r.verb == verb::pull && parameters.empty()) {
+    const auto is = [&r](verb v, std::string_view path) { return r.verb == v && r.noun.path == path; };
+    if (is(verb::pull, "cles")) {
         replies.write(r, [&](json_writer& w) { write_description(w, host); });
-    } else if (r.verb == verb::pull && parameters.size() == 1 && parameters[0] == "metrics") {
+    } else if (is(verb::pull, "cles/metrics")) {
         replies.write(r, [&](json_writer& w) { write_metrics(w, host); });
-    } else if (r.verb == verb::pull && parameters.size() == 1 && parameters[0] == "peers") {
+    } else if (is(verb::pull, "cles/peers")) {
         serve_peers(host, replies, r);
-    } else if (r.verb == verb::push && parameters.size() == 1 && parameters[0] == "peers" &&
-               host.gossip_responder != nullptr) {
+    } else if (is(verb::push, "cles/peers") && host.gossip_responder != nullptr) {
         if (host.gossip_responder->on_pushed_table(r.body, observed_source::of(peer), host.time.now())) {
             replies.done(reply_target{r}, {});
         } else {
             replies.fail(r, errc::bad_request, host.name + ": the body is not a table of nodes");
         }
-    } else if (r.verb == verb::push && parameters.size() == 1 && parameters[0] == "slots" && host.sharing != nullptr) {
+    } else if (is(verb::push, "cles/slots") && host.sharing != nullptr) {
         host.sharing->serve_slots(replies, r, peer, host.time.now());
     } else if (host.spans && is_spans_request(r)) {
         if (const auto id = protocol::parse_trace_id(parameters[1])) {

@@ -50,7 +50,7 @@ void session::on_line(std::string_view line, time_point now) {
     if (line.empty() || closed_) {
         return;
     }
-    if (is_datagram() && protocol::has_many_lines(line)) {
+    if (out_.is_datagram() && protocol::has_many_lines(line)) {
         if (!is_web_datagram(line)) {
             refuse(line, "a datagram must contain one line");
         }
@@ -68,7 +68,7 @@ void session::on_line(std::string_view line, time_point now) {
         return;
     }
     if (protocol::is_http(line)) {
-        if (is_datagram()) { // web pages cannot send datagrams
+        if (out_.is_datagram()) { // web pages cannot send datagrams
             return;
         }
         node_->write_log(log_level::warning, {"rejected a web client: " + peer_.address, peer_.address});
@@ -82,7 +82,7 @@ void session::on_line(std::string_view line, time_point now) {
         inbound_.on_malformed(malformed);
     } else if (request.is_update()) {
         on_update(subscriptions_.find(line, request));
-    } else if (!is_datagram() && is_leave_notice(request)) {
+    } else if (!out_.is_datagram() && is_leave_notice(request)) {
         on_leaving();
     } else if (!secured_ || !secured_->serve(request, now)) {
         inbound_.on_request(line, request, now);
@@ -145,7 +145,7 @@ void session::send_hello() {
 }
 
 void session::send_leave_notice() {
-    if (!is_datagram() && !std::exchange(closed_, true)) {
+    if (!out_.is_datagram() && !std::exchange(closed_, true)) {
         protocol::append_request(out_.output(),
                                  {.verb = verb::push, .noun = "self:cles/leaving", .wants_reply = false});
         out_.finish();
@@ -175,14 +175,14 @@ void session::on_overlong(std::string_view head) {
     may_be_refused_ = false;
     refusal_.clear();
     head = protocol::trim(head);
-    if (is_datagram() && is_web_datagram(head)) {
+    if (out_.is_datagram() && is_web_datagram(head)) {
         return;
     }
     if (!protocol::is_reply(head)) {
         inbound_.on_overlong(head);
         return;
     }
-    if (is_datagram()) {
+    if (out_.is_datagram()) {
         ++node_->counts.replies_dropped;
         return;
     }

@@ -45,7 +45,6 @@ class session {
     void expect_refusal() noexcept { may_be_refused_ = true; }
 
   private:
-    [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
     [[gnu::cold]] void refuse(std::string_view text, const char* why);
     void on_reply(std::string_view line);
     [[gnu::cold]] void note_refusal(std::string_view line);

@@ -60,7 +60,7 @@ class wait final : public cles::detail::pending_event {
 const cles::update_mark seventh{.seq = 7, .epoch = 0x5f3a09c1};
 
 struct fixture {
-    explicit fixture(cles::limits bounds = {})
+    explicit fixture(cles::limits bounds = {.lease = 9s})
         : feed(host, deadlines, completions, bounds, "car1", "speed", false, 7) {}
 
     /// Binds for the first time; the publisher replies with `last`.
@@ -388,7 +388,7 @@ BOOST_AUTO_TEST_CASE(a_feed_of_all_tracks_publishers_up_to_its_limit) {
 BOOST_AUTO_TEST_CASE(a_binding_by_datagram_is_renewed_at_a_third_of_its_lease) {
     bound();
     const auto asked = clock.now();
-    feed.on_leased(asked, 9s);
+    feed.on_leased(asked);
     pass(2s);
     BOOST_TEST(host.renewals == 0);
     pass(1s);
@@ -402,7 +402,7 @@ BOOST_AUTO_TEST_CASE(a_binding_by_datagram_is_renewed_at_a_third_of_its_lease) {
 
 BOOST_AUTO_TEST_CASE(unanswered_renewals_lose_the_feed_which_binds_again) {
     bound();
-    feed.on_leased(clock.now(), 9s);
+    feed.on_leased(clock.now());
     pass(3s);
     const auto asked = clock.now();
     pass(6s);
@@ -412,7 +412,7 @@ BOOST_AUTO_TEST_CASE(unanswered_renewals_lose_the_feed_which_binds_again) {
     pass(100ms);
     BOOST_TEST(host.binds == 2);
     feed.on_bound("[1]");
-    feed.on_leased(clock.now(), 9s);
+    feed.on_leased(clock.now());
     BOOST_TEST(next() == "rebound");
     BOOST_TEST(next() == "current [1]");
     pass(3s);
@@ -421,7 +421,7 @@ BOOST_AUTO_TEST_CASE(unanswered_renewals_lose_the_feed_which_binds_again) {
 
 BOOST_AUTO_TEST_CASE(a_refused_renewal_loses_the_feed_at_once) {
     bound();
-    feed.on_leased(clock.now(), 9s);
+    feed.on_leased(clock.now());
     pass(3s);
     feed.on_renewal_refused(clock.now(), errc::no_task, "car1 has no BIND 'speed'", clock.now());
     BOOST_TEST(next() == "lost car1 has no BIND 'speed'");
@@ -429,7 +429,7 @@ BOOST_AUTO_TEST_CASE(a_refused_renewal_loses_the_feed_at_once) {
 
 BOOST_AUTO_TEST_CASE(a_busy_publisher_is_asked_to_renew_again) {
     bound();
-    feed.on_leased(clock.now(), 9s);
+    feed.on_leased(clock.now());
     pass(3s);
     feed.on_renewal_refused(clock.now(), errc::busy, "later", clock.now());
     BOOST_TEST(next() == "(nothing)");
@@ -439,7 +439,7 @@ BOOST_AUTO_TEST_CASE(a_busy_publisher_is_asked_to_renew_again) {
 
 BOOST_AUTO_TEST_CASE(a_last_value_too_large_for_a_renewal_does_not_lose_the_feed) {
     bound();
-    feed.on_leased(clock.now(), 9s);
+    feed.on_leased(clock.now());
     pass(3s);
     feed.on_renewal_refused(clock.now(), errc::too_large, "use TCP", clock.now());
     BOOST_TEST(next() == "(nothing)");
@@ -465,12 +465,12 @@ BOOST_AUTO_TEST_CASE(a_last_value_too_large_for_the_reply_does_not_refuse_a_repe
 BOOST_AUTO_TEST_CASE(a_reply_to_a_renewal_of_an_earlier_binding_is_ignored) {
     bound();
     const auto asked = clock.now();
-    feed.on_leased(asked, 9s);
+    feed.on_leased(asked);
     pass(3s);
     lose();
     pass(100ms);
     feed.on_bound("{}");
-    feed.on_leased(clock.now(), 9s);
+    feed.on_leased(clock.now());
     feed.on_renewal_refused(asked, errc::deadline, "", clock.now());
     BOOST_TEST(host.detaches == 0);
 }
@@ -478,12 +478,12 @@ BOOST_AUTO_TEST_CASE(a_reply_to_a_renewal_of_an_earlier_binding_is_ignored) {
 BOOST_AUTO_TEST_CASE(it_renews_at_a_third_of_the_lease_with_jitter) {
     std::set<cles::time_point> times;
     for (std::uint32_t seed = 1; seed < 100; ++seed) {
-        cles::core::feed_machine one{host, deadlines, completions, {}, "car1", "speed", false, seed * 7919};
+        cles::core::feed_machine one{host, deadlines, completions, {.lease = 9s}, "car1", "speed", false, seed * 7919};
         auto [operation, result] = cles::test::record();
         one.start(std::move(operation));
         one.on_bound("{}");
         const auto now = clock.now();
-        one.on_leased(now, 9s);
+        one.on_leased(now);
         const auto due = *deadlines.next();
         BOOST_TEST((due >= now + 2250ms));
         BOOST_TEST((due <= now + 3s));
@@ -495,7 +495,7 @@ BOOST_AUTO_TEST_CASE(it_renews_at_a_third_of_the_lease_with_jitter) {
 BOOST_AUTO_TEST_CASE(each_reply_renews_the_lease_from_the_time_of_the_request) {
     bound();
     const auto begun = clock.now();
-    feed.on_leased(begun, 9s);
+    feed.on_leased(begun);
     pass(3s);
     BOOST_TEST(host.renewals == 1);
     BOOST_TEST((host.renew_until == begun + 9s)); // a later reply counts as none
@@ -511,7 +511,7 @@ BOOST_AUTO_TEST_CASE(a_late_reply_is_followed_by_a_renewal_at_once) {
     bound();
     const auto asked = clock.now();
     clock.advance(4s);
-    feed.on_leased(asked, 9s);
+    feed.on_leased(asked);
     pass(0ms);
     BOOST_TEST(host.renewals == 1);
 }
@@ -519,7 +519,7 @@ BOOST_AUTO_TEST_CASE(a_late_reply_is_followed_by_a_renewal_at_once) {
 BOOST_AUTO_TEST_CASE(a_busy_publisher_is_asked_again_until_the_lease_expires) {
     bound();
     const auto begun = clock.now();
-    feed.on_leased(begun, 9s);
+    feed.on_leased(begun);
     pass(3s);
     int tries = 0;
     for (;;) {
@@ -539,7 +539,7 @@ BOOST_AUTO_TEST_CASE(a_busy_publisher_is_asked_again_until_the_lease_expires) {
 
 BOOST_AUTO_TEST_CASE(a_lost_feed_is_not_renewed) {
     bound();
-    feed.on_leased(clock.now(), 9s);
+    feed.on_leased(clock.now());
     lose();
     pass(1h);
     BOOST_TEST(host.renewals == 0);
@@ -547,7 +547,7 @@ BOOST_AUTO_TEST_CASE(a_lost_feed_is_not_renewed) {
 
 BOOST_AUTO_TEST_CASE(a_closed_feed_is_not_renewed) {
     bound();
-    feed.on_leased(clock.now(), 9s);
+    feed.on_leased(clock.now());
     feed.close(errc::cancelled);
     pass(1h);
     BOOST_TEST(host.renewals == 0);

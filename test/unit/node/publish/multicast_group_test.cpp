@@ -66,7 +66,7 @@ BOOST_AUTO_TEST_CASE(an_update_is_sent_on_the_interfaces_with_subscribers) {
     node.publish_now("speed", "4");
     BOOST_TEST(out_lo.take().empty());
     BOOST_TEST(out_card.take().size() == 1U);
-    on_lo.unbind_all();
+    on_lo.stop();
     BOOST_TEST(node.counts().group_leases == 1U);
 }
 

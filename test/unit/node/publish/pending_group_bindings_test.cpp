@@ -72,7 +72,7 @@ BOOST_AUTO_TEST_CASE(a_source_that_unbinds_meanwhile_is_not_bound) {
 
 BOOST_AUTO_TEST_CASE(nothing_is_bound_after_clear) {
     hear("BIND all:pose");
-    session.unbind_all();
+    session.stop();
     BOOST_TEST(node.started.at(0)->stopped);
     node.started[0]->call->done("");
     BOOST_TEST(leases() == 0U);

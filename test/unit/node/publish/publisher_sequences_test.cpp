@@ -7,10 +7,10 @@ BOOST_AUTO_TEST_SUITE(publisher_sequences)
 
 BOOST_AUTO_TEST_CASE(each_publisher_has_its_own_sequence) {
     cles::core::publisher_sequences orders{8};
-    BOOST_TEST(orders.of("car1").take(1, 7).is_new);
-    BOOST_TEST(orders.of("car2").take(1, 7).is_new);
-    BOOST_TEST(!orders.of("car1").take(1, 7).is_new);
-    BOOST_TEST(orders.of("car2").take(1, 9).missed == 1U);
+    BOOST_TEST(orders.of("car1").take(1, 7).has_value());
+    BOOST_TEST(orders.of("car2").take(1, 7).has_value());
+    BOOST_TEST(!orders.of("car1").take(1, 7).has_value());
+    BOOST_TEST(orders.of("car2").take(1, 9).value() == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(beyond_the_limit_the_least_recent_publisher_is_forgotten) {
@@ -20,8 +20,8 @@ BOOST_AUTO_TEST_CASE(beyond_the_limit_the_least_recent_publisher_is_forgotten) {
     orders.of("car1").take(1, 8);
     orders.of("car3").take(1, 1);
     BOOST_TEST(orders.size() == 2U);
-    BOOST_TEST(!orders.of("car1").take(1, 8).is_new);
-    BOOST_TEST(orders.of("car2").take(1, 7).is_new); // forgotten meanwhile
+    BOOST_TEST(!orders.of("car1").take(1, 8).has_value());
+    BOOST_TEST(orders.of("car2").take(1, 7).has_value()); // forgotten meanwhile
 }
 
 BOOST_AUTO_TEST_SUITE_END()
