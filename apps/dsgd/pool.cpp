@@ -28,7 +28,7 @@ struct offers {
 };
 BOOST_DESCRIBE_STRUCT(offers, (), (results, errors))
 
-// For a node that is busy as well; one that has stopped takes all of it, and so does an address at which none listens.
+// For a node that is busy as well; one that has stopped takes all of it.
 constexpr std::chrono::seconds find_deadline{5};
 
 struct pool::round {
@@ -67,32 +67,25 @@ pool::pool(const std::vector<std::string>& seeds, std::chrono::seconds deadline,
 }
 
 std::map<std::string, sgd::recipe> pool::find() {
-    const auto until = steady::now() + find_deadline;
-    std::optional<offers> found;
-    while (!found) {
-        try {
-            found =
-                cles::from_json<offers>(node_.request("PULL all:sgd", cles::call_options{}.deadline(find_deadline)));
-        } catch (const cles::error& e) {
-            if (e.code() != cles::errc::no_target || !node_.peers().empty()) {
-                throw cles::error(e.code(), e.message() + ": is libcles-sgd.so among the plugins of a node?");
-            }
-            if (steady::now() >= until) {
-                throw cles::error(e.code(), "no node answers at the given address (--at): is clesd running there?");
-            }
-            io_.restart(); // a node on a busy machine may answer later
-            io_.run_for(std::chrono::milliseconds{50});
+    offers found;
+    try {
+        found = cles::from_json<offers>(node_.request("PULL all:sgd", cles::call_options{}.deadline(find_deadline)));
+    } catch (const cles::error& e) {
+        if (node_.peers().empty()) {
+            throw cles::error(cles::errc::no_target,
+                              "no node answers at the given address (--at): is clesd running there?");
         }
+        throw cles::error(e.code(), e.message() + ": is libcles-sgd.so among the plugins of a node?");
     }
     std::string silent;
-    for (const auto& [name, why] : found->errors) {
+    for (const auto& [name, why] : found.errors) {
         std::fprintf(stderr, "cles-dsgd: %s does not take part: %s\n", name.c_str(), why.message.c_str());
         silent += (silent.empty() ? "" : ", ") + name;
     }
-    if (found->results.empty()) {
+    if (found.results.empty()) {
         throw cles::error(cles::errc::deadline, "no node that offers 'sgd' answers: " + silent);
     }
-    return found->results;
+    return found.results;
 }
 
 void pool::train(board& all, const char* what) {

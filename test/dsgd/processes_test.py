@@ -301,7 +301,7 @@ class Manager(unittest.TestCase):
         begun = time.monotonic()
         code, out, err = run("--at", "tcp://127.0.0.1:1")
         self.assertEqual((code, out), (3, ""))
-        self.assertGreaterEqual(time.monotonic() - begun, 5)  # a node on a busy machine may answer later than usual
+        self.assertLess(time.monotonic() - begun, 5)  # the address refuses, so nothing is waited for
         self.assertEqual(err, "cles-dsgd: no node answers at the given address (--at): is clesd running there?\n")
 
     def test_a_node_that_does_not_answer_does_not_take_part(self):

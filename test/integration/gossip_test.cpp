@@ -57,6 +57,7 @@ struct fixture {
 
     asio::io_context idle;
     std::vector<std::unique_ptr<asio::io_context>> contexts;
+    std::unique_ptr<asio::io_context> busy; // does not run
 };
 
 } // namespace
@@ -82,6 +83,31 @@ BOOST_FIXTURE_TEST_CASE(a_request_to_a_name_that_is_not_known_yet_waits_for_the_
     car2->async_pull("car1:who", got.options(), got.take());
     until([&] { return got.done(); });
     BOOST_TEST(!got.code);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_request_waits_for_a_seed_on_a_busy_machine, fixture) {
+    const auto seed = make("seed", {});
+    busy = std::move(contexts.back()); // the system accepts links, which are not served yet
+    contexts.pop_back();
+    const auto car1 = make("car1", {at(*seed)});
+    answer<> got;
+    car1->async_pull("seed:who", got.options(), got.take());
+    const auto begun = std::chrono::steady_clock::now();
+    until([&] { return std::chrono::steady_clock::now() - begun > 700ms; });
+    BOOST_TEST(!got.done());
+    contexts.push_back(std::move(busy));
+    until([&] { return got.done(); });
+    BOOST_TEST(!got.code, got.words);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_request_fails_soon_if_nothing_listens_at_the_seed, fixture) {
+    const auto car1 = make("car1", {"tcp://127.0.0.1:1"});
+    answer<> got;
+    car1->async_pull("seed:who", got.options(), got.take());
+    const auto begun = std::chrono::steady_clock::now();
+    until([&] { return got.done(); });
+    BOOST_TEST((got.code == errc::no_target));
+    BOOST_TEST((std::chrono::steady_clock::now() - begun < 3s));
 }
 
 BOOST_FIXTURE_TEST_CASE(a_node_that_leaves_is_forgotten_at_once, fixture) {

@@ -3,7 +3,7 @@
 #include <cles/sharing.hpp>
 
 #include "api/engine.hpp"
-#include "node/sharing/sharing_driver.hpp"
+#include "node/sharing/work_sharing.hpp"
 
 #include <memory>
 

@@ -208,11 +208,14 @@ void local_node::join_group() {
     }
 }
 
-void local_node::on_discovery_grace_over() {
+void local_node::on_discovery_grace_changed() {
     const auto keep = shared_from_this();
-    peer_channels_.on_discovery_grace_over();
+    const bool expects_more = discovery_->expects_more();
+    if (!expects_more) {
+        peer_channels_.on_discovery_grace_over();
+    }
     if (routing_) {
-        routing_->release();
+        routing_->release(expects_more);
     }
 }
 
@@ -254,6 +257,17 @@ void local_node::drain_routing(time_point now) {
 
 // -- requests ------------------------------------------------------------------------------------------------------
 
+detail::pending_ptr
+local_node::reply_while_running(std::function<void(local_node& host, const peer_answer& found)> then,
+                                bool checks_json) {
+    auto if_running = [weak = weak_from_this(), then = std::move(then)](const peer_answer& found) {
+        if (const auto self = weak.lock(); self && !self->stopped_) {
+            then(*self, found);
+        }
+    };
+    return detail::pending_ptr{new peer_reply{std::move(if_running), checks_json}};
+}
+
 std::uint64_t local_node::fail_later(detail::pending_ptr operation, boost::system::error_code code, std::string message,
                                      completion::progress_function progress) {
     node_->completions.put(
@@ -280,7 +294,7 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
                           node_->name + " may not send " + std::string{to_string(how)} + " '" + std::string{noun.task} +
                               "' to " + std::string{noun.target});
     }
-    auto* r = peer_channels_.to(noun.target, options.at_, options.urgent_, code, why);
+    auto* r = peer_channels_.to({.target = noun.target, .at = options.at_, .urgent = options.urgent_}, code, why);
     if (r == nullptr) {
         return fail_later(std::move(operation), code, std::move(why));
     }

@@ -8,6 +8,7 @@
 
 #include "node/base/deadlines.hpp"
 #include "node/base/ip_network.hpp"
+#include "node/base/peer_reply.hpp"
 #include "node/flush_scheduler.hpp"
 #include "node/membership/discovery.hpp"
 #include "node/node_state.hpp"
@@ -94,7 +95,8 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     [[nodiscard]] multicast_group* group() noexcept { return group_.get(); }
     /// Cancels a request that was sent. Returns false if there is none with that id.
     bool cancel_sent(std::uint64_t id) { return peer_channels_.cancel(id) || connections_.cancel(id); }
-    void on_discovery_grace_over();
+    /// Some or all names that are unknown will not become known any more.
+    void on_discovery_grace_changed();
     /// This node's name belongs to the node at `where`.
     void on_name_taken(const std::string& where);
     [[nodiscard]] core::flush_scheduler& flush_scheduler() noexcept { return flush_scheduler_; }
@@ -108,6 +110,11 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
             }
         });
     }
+
+    /// An operation that passes the outcome of its request to `then`, unless the node has been stopped or destroyed by
+    /// then. `checks_json`: replies that are not JSON do not count.
+    [[nodiscard]] detail::pending_ptr
+    reply_while_running(std::function<void(local_node& host, const peer_answer& found)> then, bool checks_json = false);
 
     // flush_host
     void post_flush() override;
@@ -145,7 +152,7 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     ip_networks networks_;
     std::shared_ptr<node_state> node_;
     deadline_schedule schedule_{*environment_};
-    const local_node_options options_; // without `node`, which the state has
+    const local_node_options options_; // as given at the start; without `node`, which the state has
     core::peer_channels peer_channels_{*this};
     core::listeners listeners_{*this};
     core::connections connections_{*this};

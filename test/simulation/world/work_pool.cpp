@@ -4,7 +4,7 @@
 #include <cles/error.hpp>
 
 #include "jobs/service_time.hpp"
-#include "node/sharing/sharing_driver.hpp"
+#include "node/sharing/work_sharing.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -84,14 +84,13 @@ std::chrono::milliseconds interval_among(std::size_t others) noexcept {
     return std::clamp(interval_per_node * static_cast<std::int64_t>(others + 1), usual_interval, max_interval);
 }
 
-bool read_epoch(json_reader& r, std::uint32_t& out) {
+bool read_epoch(json_reader& r, std::optional<std::uint32_t>& out) {
     std::string_view text;
     if (!r.read(text)) {
         return false;
     }
-    const auto epoch = protocol::parse_epoch(text);
-    out = epoch.value_or(0);
-    return epoch || r.fail("an epoch has 8 hex digits");
+    out = protocol::parse_epoch(text);
+    return out || r.fail("an epoch has 8 hex digits");
 }
 
 bool read_milliseconds(json_reader& r, std::chrono::milliseconds& out, std::chrono::milliseconds most) {
@@ -170,21 +169,31 @@ void append_announcement_body(std::string& out, const announcement& said, std::s
     if (said.roster != 0) {
         write_member(w, "roster", said.roster);
     }
-    write_signed_member(w, said.signed_tasks);
-    write_links_member(w, said.links);
+    write_list_member(w, "signed", said.signed_tasks);
+    write_list_member(w, "links", said.links);
     w.end_object();
 }
 
-void write_links_member(json_writer& w, const std::vector<std::string>& nodes) {
-    if (!nodes.empty()) {
-        write_member(w, "links", nodes);
+void write_list_member(json_writer& w, std::string_view name, const std::vector<std::string>& all) {
+    if (!all.empty()) {
+        write_member(w, name, all);
     }
 }
 
-void write_signed_member(json_writer& w, const std::vector<std::string>& tasks) {
-    if (!tasks.empty()) {
-        write_member(w, "signed", tasks);
-    }
+bool read_signed_member(json_reader& r, std::string_view key, signed_entry& out) {
+    return key == "announced" ? r.read_raw(out.body)
+           : key == "epoch"   ? read_epoch(r, out.epoch)
+           : key == "seq"     ? r.read(out.seq)
+           : key == "sig"     ? r.read(out.sig)
+                              : r.skip();
+}
+
+void write_signed_members(json_writer& w, const signed_announcement& said, std::uint64_t seq, std::string_view epoch) {
+    w.plain_key("announced");
+    w.raw(said.body);
+    write_member(w, "seq", seq);
+    write_member(w, "epoch", epoch);
+    write_member(w, "sig", said.sig);
 }
 
 void write_load_member(json_writer& w, const node_load& load) {

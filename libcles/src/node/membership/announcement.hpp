@@ -84,16 +84,15 @@ inline constexpr std::string_view load_path = "cles/load";
 
 // Members that several kinds of entries have.
 
-/// Writes the list of nodes, unless it is empty.
-void write_links_member(json_writer& w, const std::vector<std::string>& nodes);
-/// Writes the list of signed tasks, unless it is empty.
-void write_signed_member(json_writer& w, const std::vector<std::string>& tasks);
+/// Writes a list such as `links`, unless it is empty.
+void write_list_member(json_writer& w, std::string_view name, const std::vector<std::string>& all);
 void write_load_member(json_writer& w, const node_load& load);
 void write_load(json_writer& w, const node_load& load);
 bool read_load(json_reader& r, node_load& out);
 /// Writes at most `most` of the endpoints.
 void write_endpoints_member(json_writer& w, const std::vector<std::string>& endpoints, std::size_t most);
-bool read_epoch(json_reader& r, std::uint32_t& out);
+/// Nothing if it is malformed.
+bool read_epoch(json_reader& r, std::optional<std::uint32_t>& out);
 /// A number of milliseconds; `most` if it is more.
 bool read_milliseconds(json_reader& r, std::chrono::milliseconds& out, std::chrono::milliseconds most);
 /// A number; the largest if it is more.
@@ -102,6 +101,17 @@ bool read_interval(json_reader& r, std::chrono::milliseconds& out);
 
 /// Digest for comparing lists of tasks: FNV-1a, 64 bits, in hex, of `tasks` in the reply to `PULL self:cles`.
 std::string digest_of_tasks(std::string_view json);
+
+/// A signed announcement, as it is passed on, and what belongs to it.
+struct signed_entry {
+    std::string_view body;
+    std::uint64_t seq = 0;
+    std::optional<std::uint32_t> epoch{};
+    std::string sig{};
+};
+/// Reads the value of one key; an unknown key is skipped.
+bool read_signed_member(json_reader& r, std::string_view key, signed_entry& out);
+void write_signed_members(json_writer& w, const signed_announcement& said, std::uint64_t seq, std::string_view epoch);
 
 /// An entry received by gossip: an announcement of a node, and the age of its last one.
 struct peer_report {

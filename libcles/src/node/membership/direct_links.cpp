@@ -2,6 +2,7 @@
 #include "node/membership/direct_links.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace cles::core {
 namespace {
@@ -10,25 +11,21 @@ bool contains(const std::vector<std::string>& names, std::string_view name) {
     return names.empty() || std::ranges::find(names, name) != names.end();
 }
 
-template <class Container>
-bool erase_key(Container& from, std::string_view key) {
-    const auto at = from.find(key);
-    if (at == from.end()) {
-        return false;
-    }
-    from.erase(at);
-    return true;
-}
-
 } // namespace
 
 bool direct_links::allows(std::string_view node, const membership& others) const {
-    const auto* const said = others.announcement_of(node);
-    return contains(allowed_, node) && (said == nullptr || contains(said->links, own_name_));
+    const auto* const run = others.owner(node);
+    return contains(allowed_, node) && (run == nullptr || contains(run->announced.links, own_name_));
 }
 
-bool direct_links::is_lost(const failure& f, std::string_view node, const membership& others) const {
-    return f.alive || others.last_seen(node) > f.first;
+bool direct_links::is_lost(const failure& f, std::string_view node, const membership& others) {
+    const auto* const run = others.owner(node);
+    return f.alive || (run != nullptr && run->last_seen > f.first);
+}
+
+const direct_links::failure* direct_links::find_failure(std::string_view node) const noexcept {
+    const auto at = tried_.find(node);
+    return at != tried_.end() && at->second ? &*at->second : nullptr;
 }
 
 direct_links::state direct_links::state_of(std::string_view node, const membership& others) const {
@@ -39,45 +36,47 @@ direct_links::state direct_links::state_of(std::string_view node, const membersh
     if (!where || where->empty() || !allows(node, others)) {
         return state::none;
     }
-    if (const auto failed = failed_.find(node); failed != failed_.end()) {
-        return is_lost(failed->second, node, others) ? state::lost : state::silent;
+    const auto at = tried_.find(node);
+    if (at == tried_.end()) {
+        return state::untried;
     }
-    return open_.contains(node) ? state::open : state::untried;
+    const auto& failed = at->second;
+    return !failed ? state::open : is_lost(*failed, node, others) ? state::lost : state::silent;
 }
 
 time_point direct_links::failed_at(std::string_view node) const {
-    const auto failed = failed_.find(node);
-    return failed == failed_.end() ? time_point::max() : failed->second.first;
+    const auto* const failed = find_failure(node);
+    return failed == nullptr ? time_point::max() : failed->first;
 }
 
 bool direct_links::is_due(std::string_view node, time_point now) const {
-    const auto failed = failed_.find(node);
-    return failed != failed_.end() && failed->second.next <= now;
+    const auto* const failed = find_failure(node);
+    return failed != nullptr && failed->next <= now;
 }
 
 bool direct_links::on_failure(std::string_view node, time_point now) {
-    const auto [at, is_new] = failed_.try_emplace(std::string{node});
-    erase_key(open_, node);
+    auto& failed = tried_[std::string{node}];
+    const bool is_new = !failed;
     if (is_new) {
-        at->second.first = now;
+        failed.emplace().first = now;
     }
-    if (at->second.next <= now || is_new) { // otherwise it is the same attempt
-        at->second.next = now + at->second.pause.take(max_pause);
+    if (failed->next <= now || is_new) { // otherwise it is the same attempt
+        failed->next = now + failed->pause.take(max_pause);
     }
     return is_new;
 }
 
 void direct_links::on_alive(std::string_view node) {
-    if (const auto at = failed_.find(node); at != failed_.end()) {
-        at->second.alive = true;
+    if (const auto at = tried_.find(node); at != tried_.end() && at->second) {
+        at->second->alive = true;
     }
 }
 
 std::vector<std::string> direct_links::take_lost(const membership& others) {
     std::vector<std::string> found;
-    for (auto& [node, f] : failed_) {
-        if (!f.is_reported && is_lost(f, node, others)) {
-            f.is_reported = true;
+    for (auto& [node, failed] : tried_) {
+        if (failed && !failed->is_reported && is_lost(*failed, node, others)) {
+            failed->is_reported = true;
             found.push_back(node);
         }
     }
@@ -85,15 +84,17 @@ std::vector<std::string> direct_links::take_lost(const membership& others) {
 }
 
 bool direct_links::on_success(std::string_view node) {
-    if (!open_.contains(node)) {
-        open_.emplace(node);
+    auto at = tried_.find(node);
+    if (at == tried_.end()) {
+        at = tried_.try_emplace(std::string{node}).first;
     }
-    return erase_key(failed_, node);
+    return std::exchange(at->second, std::nullopt).has_value();
 }
 
 void direct_links::forget(std::string_view node) {
-    erase_key(failed_, node);
-    erase_key(open_, node);
+    if (const auto at = tried_.find(node); at != tried_.end()) {
+        tried_.erase(at);
+    }
 }
 
 } // namespace cles::core

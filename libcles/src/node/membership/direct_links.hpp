@@ -8,8 +8,9 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
-#include <set>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -56,7 +57,7 @@ class direct_links {
     [[nodiscard]] std::vector<std::string> take_lost(const membership& others);
     /// The node has replied on a link. Returns whether the last attempt had failed.
     bool on_success(std::string_view node);
-    [[nodiscard]] bool has_failed(std::string_view node) const noexcept { return failed_.contains(node); }
+    [[nodiscard]] bool has_failed(std::string_view node) const noexcept { return find_failure(node) != nullptr; }
     void forget(std::string_view node);
 
   private:
@@ -67,12 +68,13 @@ class direct_links {
         bool alive = false;
         bool is_reported = false;
     };
-    [[nodiscard]] bool is_lost(const failure& f, std::string_view node, const membership& others) const;
+    [[nodiscard]] static bool is_lost(const failure& f, std::string_view node, const membership& others);
+    /// Null unless an attempt has failed.
+    [[nodiscard]] const failure* find_failure(std::string_view node) const noexcept;
 
     const std::string own_name_;
     std::vector<std::string> allowed_;
-    std::map<std::string, failure, std::less<>> failed_;
-    std::set<std::string, std::less<>> open_;
+    std::map<std::string, std::optional<failure>, std::less<>> tried_; // nothing: it is open
 };
 
 } // namespace cles::core

@@ -2,7 +2,6 @@
 #include "node/membership/discovery.hpp"
 
 #include <cles/error.hpp>
-#include <cles/json_reader.hpp>
 
 #include "node/local_node.hpp"
 #include "node/membership/gossip.hpp"
@@ -53,28 +52,41 @@ void announcer::on_deadline(time_point now) {
     owner_.announce(interval);
 }
 
-// -- replies -------------------------------------------------------------------------------------------------------
+// -- how long names may become known -------------------------------------------------------------------------------
 
-peer_reply::verdict peer_reply::offer(std::string_view json) {
-    if (checks_json_ && !is_valid_json(json)) {
-        return verdict::malformed;
-    }
-    finish({.json = json});
-    return verdict::completed;
+void discovery_grace::begin(time_point now, bool has_seeds) {
+    over_ = false;
+    is_for_seeds_ = false;
+    has_seeds_ = has_seeds;
+    deadlines_.arm(*this, now + length);
 }
 
-void peer_reply::finish(const peer_answer& found) {
-    const std::unique_ptr<peer_reply> self{this};
-    if (const auto host = host_.lock(); host && !host->stopped()) {
-        then_(*host, found);
+void discovery_grace::on_seeds_heard() {
+    has_seeds_ = false;
+    if (is_for_seeds_ && !over_) {
+        stop();
+        on_change_();
     }
+}
+
+void discovery_grace::stop() noexcept {
+    over_ = true;
+    deadlines_.disarm(*this);
+}
+
+void discovery_grace::on_deadline(time_point now) {
+    over_ = !has_seeds_ || std::exchange(is_for_seeds_, true);
+    if (!over_) {
+        deadlines_.arm(*this, now + (for_seeds - length));
+    }
+    on_change_();
 }
 
 // -- start and end -------------------------------------------------------------------------------------------------
 
 discovery::discovery(local_node& host, std::uint32_t seed)
     : host_(host), announcer_(*this, host.deadlines(), seed),
-      discovery_grace_(host.deadlines(), [&host] { host.on_discovery_grace_over(); }), seed_(seed * 7 + 3) {
+      discovery_grace_(host.deadlines(), [&host] { host.on_discovery_grace_changed(); }), seed_(seed * 7 + 3) {
     host.node().peers.watch(this);
     host.node().peers.set_prober(
         [this](std::uint64_t ticket, std::string_view url) { probe(ticket, std::string{url}); });
@@ -125,6 +137,7 @@ void discovery::gossip(const gossip_options& how) {
             throw error(errc::unknown_scheme, "'" + where.scheme + "' in '" + seed + "'");
         }
     }
+    has_seeds_ = !how.seeds.empty();
     if (gossip_) {
         gossip_->set_seeds(how.seeds, host_.now());
         gossip_->reach().allow_only(how.links);
@@ -155,7 +168,7 @@ void discovery::begin() {
         if (group_ != nullptr) {
             group_->send("BIND all:cles\n");
         }
-        discovery_grace_.begin(now);
+        discovery_grace_.begin(now, has_seeds_);
         if (!left_) {
             announcer_.start(now);
         }
@@ -449,17 +462,16 @@ void discovery::probe(std::uint64_t ticket, const std::string& url) {
         return;
     }
     const auto use_later = [ticket, url, name](local_node& host, const peer_answer& answer) {
-        auto found = answer.refused ? probe_outcome{}
-                     : answer.code  ? failed_probe(answer.code)
-                                    : read_probe_answer(answer.json);
+        auto found = !answer.refusal.empty() ? probe_outcome{}
+                     : answer.code           ? failed_probe(answer.code)
+                                             : read_probe_answer(answer.json);
         host.post_while_running([ticket, url, name, found = std::move(found)](local_node& alive) {
             alive.node().peers.on_probed(ticket, found, alive.now());
             alive.peer_channels().release(url, name);
         });
     };
-    host_.peer_channels().send_to_node(name, url, {.verb = verb::pull, .noun = "self:cles"},
-                                       host_.now() + name_conflicts::probe_limit,
-                                       detail::pending_ptr{new peer_reply{host_.weak_from_this(), use_later, true}});
+    host_.peer_channels().send({.target = name, .at = url, .expected = name}, {.verb = verb::pull, .noun = "self:cles"},
+                               host_.now() + name_conflicts::probe_limit, host_.reply_while_running(use_later, true));
 }
 
 bool discovery::expects_more_of(std::string_view node) const noexcept {

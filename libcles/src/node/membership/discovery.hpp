@@ -3,7 +3,6 @@
 
 #include <cles/gossip.hpp>
 #include <cles/limits.hpp>
-#include <cles/pending.hpp>
 
 #include "node/base/backoff.hpp"
 #include "node/base/deadlines.hpp"
@@ -27,36 +26,35 @@ namespace cles::core {
 class gossip;
 class local_node;
 
-/// The time after its start in which a node solicits announcements from its group: an unknown name may still be
-/// announced.
+/// The time after its start in which an unknown name may still become known: first, a node solicits announcements from
+/// its group. Then it waits for the seeds that have neither answered nor refused: on a busy machine, they may be late.
 class discovery_grace final : private deadline {
   public:
-    static constexpr std::chrono::milliseconds length{300};
+    static constexpr std::chrono::milliseconds length{300}; ///< of the first part
+    /// Of both, if a seed is silent. It ends before the usual deadline of a request, so that the request fails with the
+    /// reason.
+    static constexpr std::chrono::milliseconds for_seeds{4'000};
 
-    discovery_grace(deadline_queue& deadlines, std::function<void()> on_over)
-        : deadlines_(deadlines), on_over_(std::move(on_over)) {}
+    /// `on_change` is called at the end of each part.
+    discovery_grace(deadline_queue& deadlines, std::function<void()> on_change)
+        : deadlines_(deadlines), on_change_(std::move(on_change)) {}
 
     /// The grace period will start; its time is not running yet.
     void expect() noexcept { over_ = false; }
-    void begin(time_point now) {
-        over_ = false;
-        deadlines_.arm(*this, now + length);
-    }
-    void stop() noexcept {
-        over_ = true;
-        deadlines_.disarm(*this);
-    }
+    void begin(time_point now, bool has_seeds = false);
+    /// Every seed has answered or refused.
+    void on_seeds_heard();
+    void stop() noexcept;
     [[nodiscard]] bool over() const noexcept { return over_; }
 
   private:
-    void on_deadline(time_point) override {
-        over_ = true;
-        on_over_();
-    }
+    void on_deadline(time_point now) override;
 
     deadline_queue& deadlines_;
-    std::function<void()> on_over_;
+    std::function<void()> on_change_;
     bool over_ = true;
+    bool has_seeds_ = false; // that have not been heard
+    bool is_for_seeds_ = false;
 };
 
 /// Decides when a node announces itself to its group (docs/protocol.md, "Membership"): once per interval, a little
@@ -103,38 +101,6 @@ class announcer final : private deadline {
     bool started_ = false;
 };
 
-/// The outcome of a request to another node.
-struct peer_answer {
-    std::string_view json{}; ///< empty if it failed
-    boost::system::error_code code{};
-    bool refused = false; ///< by the node that was asked
-};
-
-/// An operation of the library that passes the outcome of its request on, unless the node has stopped.
-class peer_reply final : public detail::pending {
-  public:
-    using function = std::function<void(local_node& host, const peer_answer& found)>;
-
-    /// `checks_json`: replies that are not JSON do not count.
-    peer_reply(std::weak_ptr<local_node> host, function then, bool checks_json = false)
-        : host_(std::move(host)), then_(std::move(then)), checks_json_(checks_json) {}
-
-    verdict offer(std::string_view json) override;
-    void fail(boost::system::error_code code, std::string_view) override { finish({.code = code}); }
-    void refuse(boost::system::error_code code, std::string_view, std::string_view) override {
-        finish({.code = code, .refused = true});
-    }
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return false; }
-
-  private:
-    void finish(const peer_answer& found);
-
-    std::weak_ptr<local_node> host_;
-    function then_;
-    bool checks_json_;
-};
-
 /// Finds the other nodes and announces this one, in the multicast group and by gossip. Without either, it finds none.
 class discovery final : private announcement_listener, private membership::watcher, private announcer::sender {
   public:
@@ -162,6 +128,8 @@ class discovery final : private announcement_listener, private membership::watch
     [[nodiscard]] bool expects_more_of(std::string_view node) const noexcept;
     /// Announces this node soon, since something has changed.
     void expedite_announcement();
+    /// Every seed has answered or refused.
+    void on_seeds_heard() { discovery_grace_.on_seeds_heard(); }
     /// Receives the changes of `membership`; a test may intercept them.
     [[nodiscard]] membership::watcher& membership_watcher() noexcept { return *this; }
     /// Why a name is unknown, as the start of a sentence; empty without a group and gossip.
@@ -189,6 +157,7 @@ class discovery final : private announcement_listener, private membership::watch
     discovery_grace discovery_grace_;
     std::unique_ptr<core::gossip> gossip_; // null: it takes no part
     std::uint32_t seed_;
+    bool has_seeds_ = false;
     multicast_group* group_ = nullptr;
     std::map<std::string, std::uint32_t, std::less<>> incarnations_; // epoch by name
     std::uint64_t seq_ = 0;

@@ -51,6 +51,9 @@ void gossip::stop(time_point now) {
 
 void gossip::set_seeds(const std::vector<std::string>& urls, time_point now) {
     seeds_.set(urls);
+    if (seeds_.all_heard()) { // those that were silent are gone
+        out_.on_seeds_heard();
+    }
     if (started_) {
         deadlines_.arm(*this, now);
     }
@@ -115,7 +118,8 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
         const bool another = !c->node.empty() && c->node != table.node;
         c->describe = std::move(found.missing);
         if (another || (c->as == part::bootstrap && !table.more)) {
-            end(*c, another, now);
+            // One that has just started may not have announced itself: then it is asked again.
+            end(*c, another, now, another || others_.find_member(table.node).has_value());
         } else if (table.more) {
             c->next = now;
         } else {
@@ -169,7 +173,7 @@ void gossip::on_failure(std::uint64_t ticket, time_point now, bool silent) {
         push_routes(now);
     }
     if (++c->failures >= max_failures || c->as == part::bootstrap) {
-        end(*c, true, now);
+        end(*c, true, now, now - c->sent < limit); // one that is silent may only be slow
     } else {
         postpone(*c, now);
     }
@@ -526,8 +530,11 @@ void gossip::postpone(contact& c, time_point now) {
     c.next = now + pause - jitter_.quarter_of(pause);
 }
 
-void gossip::end(contact& c, bool rests, time_point now) {
+void gossip::end(contact& c, bool rests, time_point now, bool heard) {
     c.ended = true;
+    if (heard && c.as == part::bootstrap && seeds_.on_heard(c.url)) {
+        out_.on_seeds_heard();
+    }
     if (rests && !c.node.empty()) {
         contacts_.rest(c.node, now + interval() * intervals_of_rest);
     }

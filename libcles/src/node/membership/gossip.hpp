@@ -53,6 +53,8 @@ class gossip : private deadline {
         virtual void push(const destination& at, std::string_view table) = 0;
         /// No requests follow there for a while.
         virtual void release(const destination& at) = 0;
+        /// Every seed has answered or refused, once or more.
+        virtual void on_seeds_heard() {}
         /// A signed announcement states this version of its node's roster.
         virtual void on_stated_roster(std::string_view, std::uint32_t) {}
 
@@ -140,7 +142,8 @@ class gossip : private deadline {
     void send_own_entry(contact& c, time_point now);
     void send_own_entry_if_not_asked(time_point now);
     void postpone(contact& c, time_point now);
-    void end(contact& c, bool rests, time_point now);
+    /// `heard`: it has told of itself, or refused.
+    void end(contact& c, bool rests, time_point now, bool heard = true);
     void sweep();
     void follow(time_point now);
     [[nodiscard]] time_point due_of(const contact& c, time_point now) const;

@@ -121,6 +121,16 @@ void seeds::on_self(std::string_view url) {
     }
 }
 
+bool seeds::on_heard(std::string_view url) {
+    bool is_news = false;
+    for (auto& s : all_) {
+        is_news |= s.url == url && !std::exchange(s.heard, true);
+    }
+    return is_news && all_heard();
+}
+
+bool seeds::all_heard() const { return std::ranges::all_of(all_, &seed::heard); }
+
 void seeds::prefer_in(membership& others) const {
     for (const auto& s : all_) {
         const auto known = s.node.empty() ? std::nullopt : others.find_member(s.node);

@@ -145,6 +145,9 @@ class seeds {
     void on_answer(std::string_view url, std::string_view node);
     /// `url` leads to this node itself.
     void on_self(std::string_view url);
+    /// The seed has answered or refused. Returns whether it was the last that had not.
+    bool on_heard(std::string_view url);
+    [[nodiscard]] bool all_heard() const;
     /// Has the nodes that replied be reached at the URLs where they did, if they have announced these. It may have
     /// become known only later which they have announced, and the first one may lead nowhere from here.
     void prefer_in(membership& others) const;
@@ -154,6 +157,7 @@ class seeds {
         std::string url;
         std::string node{}; // that replied there
         bool self = false;
+        bool heard = false;
         doubling_pause pause{first_pause};
         time_point next = time_point::min();
     };

@@ -76,6 +76,9 @@ class gossip_driver final : private gossip::client, public gossip {
             [node = std::string{node}](local_node& host) { host.peer_channels().on_route_changed(node); });
     }
 
+    void on_seeds_heard() override {
+        host_.post_while_running([](local_node& host) { host.discovery().on_seeds_heard(); });
+    }
     void on_stated_roster(std::string_view node, std::uint32_t version) override {
         if (const auto& secured = host_.node().secured) {
             secured->on_stated_roster(node, version, host_.now());
@@ -85,14 +88,13 @@ class gossip_driver final : private gossip::client, public gossip {
     /// The operation of a request, whose reply is passed to `taken`. This lives as long as the node.
     detail::pending_ptr reply_to(std::uint64_t ticket,
                                  void (gossip::*taken)(std::uint64_t, std::string_view, time_point)) {
-        return detail::pending_ptr{
-            new peer_reply{host_.weak_from_this(), [this, ticket, taken](local_node& host, const peer_answer& answer) {
-                               if (answer.code) {
-                                   on_failure(ticket, host.now(), !answer.refused && is_of_link(answer.code));
-                               } else {
-                                   (this->*taken)(ticket, answer.json, host.now());
-                               }
-                           }}};
+        return host_.reply_while_running([this, ticket, taken](local_node& host, const peer_answer& answer) {
+            if (answer.code) {
+                on_failure(ticket, host.now(), answer.refusal.empty() && is_of_link(answer.code));
+            } else {
+                (this->*taken)(ticket, answer.json, host.now());
+            }
+        });
     }
     /// Whether the link is to blame: it could not be opened, was lost, or carries nothing.
     static bool is_of_link(boost::system::error_code code) {
@@ -100,12 +102,8 @@ class gossip_driver final : private gossip::client, public gossip {
                (code.category() != error_category() && code != boost::system::errc::too_many_files_open);
     }
     void send(const destination& at, const protocol::outgoing_request& request, detail::pending_ptr operation) {
-        const auto due = host_.now() + limit;
-        if (at.node.empty()) {
-            host_.peer_channels().send("self", at.url, request, due, std::move(operation), {});
-        } else {
-            host_.peer_channels().send_to_node(at.node, at.url, request, due, std::move(operation));
-        }
+        host_.peer_channels().send({.target = at.node, .at = at.url, .expected = at.node}, request, host_.now() + limit,
+                                   std::move(operation));
     }
 
     local_node& host_;

@@ -567,14 +567,14 @@ void membership::notify_seen(std::string_view node) const {
 
 // -- queries -------------------------------------------------------------------------------------------------------
 
-std::optional<std::string_view> membership::address_of(std::string_view node) const noexcept {
+const incarnation* membership::owner(std::string_view node) const noexcept {
     const auto at = peers_.find(node);
-    return at == peers_.end() ? std::nullopt : std::optional{at->second.owner.where()};
+    return at == peers_.end() ? nullptr : &at->second.owner;
 }
 
-time_point membership::last_seen(std::string_view node) const noexcept {
-    const auto at = peers_.find(node);
-    return at == peers_.end() ? time_point::min() : at->second.owner.last_seen;
+std::optional<std::string_view> membership::address_of(std::string_view node) const noexcept {
+    const auto* const run = owner(node);
+    return run == nullptr ? std::nullopt : std::optional{run->where()};
 }
 
 const std::string* membership::owner_of(std::uint32_t epoch) const noexcept {
@@ -617,19 +617,9 @@ void membership::touch(std::uint32_t epoch) {
     }
 }
 
-const std::vector<std::string>* membership::endpoints_of(std::string_view node) const noexcept {
-    const auto at = peers_.find(node);
-    return at == peers_.end() ? nullptr : &at->second.owner.endpoints;
-}
-
 const incarnation* membership::announced(std::string_view node) const noexcept {
-    const auto found = peers_.find(node);
-    return found != peers_.end() && found->second.owner.from != group_source{} ? &found->second.owner : nullptr;
-}
-
-const announcement* membership::announcement_of(std::string_view node) const noexcept {
-    const auto found = peers_.find(node);
-    return found == peers_.end() ? nullptr : &found->second.owner.announced;
+    const auto* const run = owner(node);
+    return run != nullptr && run->from != group_source{} ? run : nullptr;
 }
 
 std::optional<membership::member> membership::find_member(std::string_view node) const {

@@ -128,8 +128,6 @@ class membership final : private deadline {
     /// The URL at which the node is reached; nothing if it is unknown, empty if none of its addresses is usable from
     /// here. Valid until the next change.
     [[nodiscard]] std::optional<std::string_view> address_of(std::string_view node) const noexcept;
-    /// When the node last announced itself; the earliest time if it is unknown.
-    [[nodiscard]] time_point last_seen(std::string_view node) const noexcept;
     /// The node of that incarnation; null if it is unknown, or not the owner of its name.
     [[nodiscard]] const std::string* owner_of(std::uint32_t epoch) const noexcept;
     /// That incarnation of the node has replied at the URL: it is used instead of an address of the same kind that
@@ -139,8 +137,6 @@ class membership final : private deadline {
     void touch(std::string_view node);
     /// The same for the owner of a name, by its epoch.
     void touch(std::uint32_t epoch);
-    /// All such URLs, the preferred one first; null if it is unknown.
-    [[nodiscard]] const std::vector<std::string>* endpoints_of(std::string_view node) const noexcept;
     /// The number of other nodes.
     [[nodiscard]] std::size_t size() const noexcept { return peers_.size(); }
     /// The limit of `size`.
@@ -148,10 +144,10 @@ class membership final : private deadline {
     /// All nodes by name; the contender of a name conflict follows the owner.
     [[nodiscard]] std::vector<peer> list(time_point now) const;
 
-    /// The owner of the name; null if it was not received in the group. Valid until the next change.
+    /// The owner of the name; null if there is none. Valid until the next change.
+    [[nodiscard]] const incarnation* owner(std::string_view node) const noexcept;
+    /// The same; null too if it was not received in the group.
     [[nodiscard]] const incarnation* announced(std::string_view node) const noexcept;
-    /// The last announcement of a node, received from it or by gossip; null if there is none.
-    [[nodiscard]] const announcement* announcement_of(std::string_view node) const noexcept;
     /// Nothing if the node is unknown.
     [[nodiscard]] std::optional<member> find_member(std::string_view node) const;
     /// The node with the next name; after the last the first; nothing if none is known.

@@ -24,17 +24,16 @@ constexpr std::size_t max_probes = 64; // in progress
 probe_outcome read_probe_answer(std::string_view json) {
     constexpr std::chrono::milliseconds longest{std::numeric_limits<std::int64_t>::max() / 1'000'000};
     probe_outcome found;
-    bool has_epoch = false;
+    std::optional<std::uint32_t> epoch;
     json_reader r{json};
     const bool good = read_members(r, [&](std::string_view key) {
-        if (key == "epoch") {
-            return has_epoch = read_epoch(r, found.epoch);
-        }
         return key == "node"        ? r.read(found.node)
+               : key == "epoch"     ? read_epoch(r, epoch)
                : key == "uptime_ms" ? read_milliseconds(r, found.uptime, longest)
                                     : r.skip();
     });
-    if (good && has_epoch && !found.node.empty()) {
+    found.epoch = epoch.value_or(0);
+    if (good && epoch && !found.node.empty()) {
         found.what = outcome::answered;
     }
     return found;

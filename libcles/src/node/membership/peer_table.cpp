@@ -29,11 +29,7 @@ std::int64_t age_of(time_point last_seen, time_point now) {
 void write_signed_entry(json_writer& w, const delta_entry& item, time_point now) {
     const bool left = item.what == delta_entry::kind::leave || (item.announced != nullptr && item.announced->leaving);
     w.begin_object();
-    w.plain_key("announced");
-    w.raw(item.original->body);
-    write_member(w, "seq", item.seq);
-    write_member(w, "epoch", protocol::epoch_text(item.epoch));
-    write_member(w, "sig", item.original->sig);
+    write_signed_members(w, *item.original, item.seq, protocol::epoch_text(item.epoch));
     write_member(w, "age_ms", age_of(item.last_seen, now));
     write_member(w, "state", left ? "left" : to_string(item.state));
     w.end_object();
@@ -67,8 +63,8 @@ void write_entry(json_writer& w, const delta_entry& item, time_point now, std::s
     if (said != nullptr) {
         write_load_member(w, said->load);
         write_member(w, "tasks", said->tasks);
-        write_signed_member(w, said->signed_tasks);
-        write_links_member(w, said->links);
+        write_list_member(w, "signed", said->signed_tasks);
+        write_list_member(w, "links", said->links);
     }
     w.end_object();
 }
@@ -174,24 +170,23 @@ bool is_of_a_node(const peer_report& report) noexcept {
 }
 
 bool read_entry(std::string_view json, peer_report& out) {
-    bool has_epoch = false;
+    std::optional<std::uint32_t> epoch;
     json_reader r{json, table_depth};
     const bool good = read_members(r, [&](std::string_view key) {
-        if (key == "epoch") {
-            return has_epoch = read_epoch(r, out.epoch);
-        }
         if (key == "state") {
             std::string_view state;
             const bool is_text = r.read(state);
             out.announced.leaving = state == "left";
             return is_text;
         }
-        return key == "seq"       ? r.read(out.seq)
+        return key == "epoch"     ? read_epoch(r, epoch)
+               : key == "seq"     ? r.read(out.seq)
                : key == "age_ms"  ? read_milliseconds(r, out.age, max_age)
                : key == "leaving" ? r.skip()
                                   : read_announcement_member(r, key, out.announced);
     });
-    return good && has_epoch && is_of_a_node(out);
+    out.epoch = epoch.value_or(0);
+    return good && epoch && is_of_a_node(out);
 }
 
 // Signed announcements are passed on unchanged. So an unspecified address or Unix socket in one means nothing, and a
@@ -208,25 +203,20 @@ void keep_endpoints_for_others(std::vector<std::string>& endpoints) {
 
 // Beside the announcement, only its age counts.
 bool read_signed_entry(std::string_view json, peer_report& out) {
-    bool has_epoch = false;
-    std::string_view body;
-    std::string sig;
+    signed_entry entry;
     json_reader r{json, table_depth + 1};
     const bool good = read_members(r, [&](std::string_view key) {
-        return key == "announced" ? r.read_raw(body)
-               : key == "epoch"   ? (has_epoch = read_epoch(r, out.epoch))
-               : key == "seq"     ? r.read(out.seq)
-               : key == "sig"     ? r.read(sig)
-               : key == "age_ms"  ? read_milliseconds(r, out.age, max_age)
-                                  : r.skip();
+        return key == "age_ms" ? read_milliseconds(r, out.age, max_age) : read_signed_member(r, key, entry);
     });
-    if (!good || !has_epoch || out.seq == 0 || sig.empty() || body.size() > protocol::datagram_bytes ||
-        !read_announcement(body, out.announced) || !is_of_a_node(out)) {
+    if (!good || !entry.epoch || entry.seq == 0 || entry.sig.empty() || entry.body.size() > protocol::datagram_bytes ||
+        !read_announcement(entry.body, out.announced) || !is_of_a_node(out)) {
         return false;
     }
+    out.epoch = *entry.epoch;
+    out.seq = entry.seq;
     keep_endpoints_for_others(out.announced.endpoints);
     out.announced.original =
-        std::make_shared<signed_announcement>(signed_announcement{std::string{body}, std::move(sig)});
+        std::make_shared<signed_announcement>(signed_announcement{std::string{entry.body}, std::move(entry.sig)});
     return true;
 }
 
@@ -411,16 +401,15 @@ bool read_table(std::string_view json, std::size_t max_entries, std::chrono::mil
 bool read_description(std::string_view json, std::chrono::milliseconds usual, peer_report& out) {
     out = {};
     out.announced.interval = usual;
-    bool has_epoch = false;
+    std::optional<std::uint32_t> epoch;
     json_reader r{json};
     const bool good = read_members(r, [&](std::string_view key) {
-        if (key == "epoch") {
-            return has_epoch = read_epoch(r, out.epoch);
-        }
-        return key == "node" || key == "endpoints" || key == "pool" ? read_announcement_member(r, key, out.announced)
-                                                                    : r.skip();
+        return key == "epoch"                                         ? read_epoch(r, epoch)
+               : key == "node" || key == "endpoints" || key == "pool" ? read_announcement_member(r, key, out.announced)
+                                                                      : r.skip();
     });
-    return good && has_epoch && is_of_a_node(out);
+    out.epoch = epoch.value_or(0);
+    return good && epoch && is_of_a_node(out);
 }
 
 void write_peers(json_writer& w, const std::vector<peer>& all, std::string_view pool) {

@@ -57,11 +57,11 @@ std::string reachability::next_hop_to(std::string_view node, std::string_view vi
     if (is_direct(node)) {
         return std::string{node};
     }
-    const auto hop = routes_.next_hop(node, usable(), [&](std::string_view by) {
+    const auto* const route = routes_.find_route(node, usable(), [&](std::string_view by) {
         return is_in_via(via, by) || (!requester.empty() && by != node && !out_.may_forward(by, requester));
     });
-    if (!hop.empty()) {
-        return std::string{hop};
+    if (route != nullptr) {
+        return route->by;
     }
     return !address_of(node).empty() && allows(node) ? std::string{node} : std::string{}; // a last attempt
 }
@@ -71,7 +71,11 @@ bool reachability::is_beyond(std::string_view node) const {
 }
 
 std::optional<unsigned> reachability::hops_to(std::string_view node) const {
-    return is_direct(node) ? std::optional{1U} : routes_.hops_to(node, usable());
+    if (is_direct(node)) {
+        return 1U;
+    }
+    const auto* const route = routes_.find_route(node, usable());
+    return route == nullptr ? std::nullopt : std::optional{route->hops + 1};
 }
 
 void reachability::add_routes(std::vector<peer>& all) const {
@@ -82,8 +86,6 @@ void reachability::add_routes(std::vector<peer>& all) const {
         }
     }
 }
-
-void reachability::on_unreachable(std::string_view node, time_point now) { lose(node, now); }
 
 // That somebody accepts a link there does not show that it is the node, but the attempts to reach it no longer fail.
 void reachability::on_opened(std::string_view node) {

@@ -73,8 +73,8 @@ class reachability {
     [[nodiscard]] virtual std::optional<unsigned> hops_to(std::string_view node) const;
     /// Completes the list of nodes by the routes to them.
     virtual void add_routes(std::vector<peer>& all) const;
-    /// No link could be opened to the node.
-    virtual void on_unreachable(std::string_view node, time_point now);
+    /// No link could be opened to the node, or it does not reply: what it has advertised does not count until it does.
+    virtual void lose(std::string_view neighbour, time_point now);
     /// A link has been opened to it.
     virtual void on_opened(std::string_view node);
     /// The node has announced other `links`.
@@ -112,8 +112,6 @@ class reachability {
     void on_reply(const peer_table& table);
     /// It has sent routes without being asked, or asks for numbers.
     void on_pushed(const peer_table& table);
-    /// It does not reply: what it has advertised does not count until it does.
-    void lose(std::string_view neighbour, time_point now);
     /// Whether there are routes to be pushed to neighbours.
     [[nodiscard]] bool has_unsent() const noexcept { return !unsent_.empty(); }
     /// When they may be: at once, but not too often, because nodes that lose their routes may change each other's

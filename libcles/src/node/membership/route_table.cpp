@@ -49,11 +49,11 @@ route_table::change route_table::apply(std::string_view name, std::uint32_t epoc
     change found;
     if (known != nullptr) {
         found.was_offered = std::ranges::find(known->offers, neighbour, &offer::by) != known->offers.end();
-        found.before = copy_of(best(*known, usable, {}));
+        found.before = copy_of(best(*known, usable));
     }
     d = d != nullptr ? d : &entry_of(name, epoch);
     d->take(neighbour, offered);
-    found.after = copy_of(best(*d, usable, {}));
+    found.after = copy_of(best(*d, usable));
     found.requested = d->requested;
     found.missing = missing_number(*d, usable);
     return found;
@@ -126,21 +126,10 @@ const route_table::offer* route_table::best(const destination& d, const usable_f
     return found;
 }
 
-const route_table::offer* route_table::find(std::string_view name, const usable_function& usable,
-                                            const std::function<bool(std::string_view)>& avoid) const {
+const route_table::route* route_table::find_route(std::string_view name, const usable_function& usable,
+                                                  const std::function<bool(std::string_view)>& avoid) const {
     const auto* const d = find(name);
     return d == nullptr ? nullptr : best(*d, usable, avoid);
-}
-
-std::string_view route_table::next_hop(std::string_view name, const usable_function& usable,
-                                       const std::function<bool(std::string_view)>& avoid) const {
-    const auto* const found = find(name, usable, avoid);
-    return found == nullptr ? std::string_view{} : std::string_view{found->by};
-}
-
-std::optional<unsigned> route_table::hops_to(std::string_view name, const usable_function& usable) const {
-    const auto* const found = find(name, usable);
-    return found == nullptr ? std::nullopt : std::optional{found->hops + 1};
 }
 
 std::uint64_t route_table::missing_number(std::string_view name, const usable_function& usable) const {
@@ -152,7 +141,7 @@ std::uint64_t route_table::missing_number(const destination& d, const usable_fun
     if (d.hops > max_hops) {
         return 0;
     }
-    const auto* const chosen = best(d, usable, {});
+    const auto* const chosen = best(d, usable);
     return chosen != nullptr && d.is_feasible(*chosen) ? 0 : d.seq + 1;
 }
 
@@ -177,7 +166,7 @@ route_advert route_table::advertise(std::string_view name, std::uint32_t epoch, 
     if (d == nullptr) {
         return {};
     }
-    const auto* const chosen = best(*d, usable, {});
+    const auto* const chosen = best(*d, usable);
     if (chosen == nullptr || chosen->by == to || !d->is_feasible(*chosen)) { // it would or may come back
         return {.seq = d->newest};
     }

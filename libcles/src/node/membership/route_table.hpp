@@ -64,15 +64,13 @@ class route_table {
     /// Those that advertise it.
     [[nodiscard]] std::vector<std::string> neighbours_of(std::string_view name) const;
 
-    /// The neighbour to which a request is sent, by the shortest route that does not lead through a node for which
-    /// `avoid` is true; empty: there is none.
-    [[nodiscard]] std::string_view next_hop(std::string_view name, const usable_function& usable,
-                                            const std::function<bool(std::string_view)>& avoid = {}) const;
+    /// The route by which a request is sent: the shortest that does not lead through a node for which `avoid` is true;
+    /// null: there is none. Valid until the next change.
+    [[nodiscard]] const route* find_route(std::string_view name, const usable_function& usable,
+                                          const std::function<bool(std::string_view)>& avoid = {}) const;
     /// What this node advertises to the neighbour `to`. `direct`: it has a link to the destination.
     route_advert advertise(std::string_view name, std::uint32_t epoch, bool direct, const usable_function& usable,
                            std::string_view to);
-    /// The length of the route in use, in links; nothing: there is none.
-    [[nodiscard]] std::optional<unsigned> hops_to(std::string_view name, const usable_function& usable) const;
     /// Without a number of at least that, no route to the destination can be advertised again; 0: there is one, or
     /// none was ever advertised.
     [[nodiscard]] std::uint64_t missing_number(std::string_view name, const usable_function& usable) const;
@@ -106,9 +104,6 @@ class route_table {
 
     /// The route in use; null if there is none.
     [[nodiscard]] const offer* best(const destination& d, const usable_function& usable,
-                                    const std::function<bool(std::string_view)>& avoid) const;
-    /// The same by name; null too if the destination is unknown.
-    [[nodiscard]] const offer* find(std::string_view name, const usable_function& usable,
                                     const std::function<bool(std::string_view)>& avoid = {}) const;
     /// Null if it is unknown.
     [[nodiscard]] const destination* find(std::string_view name) const;

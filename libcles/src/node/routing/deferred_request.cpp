@@ -48,12 +48,12 @@ void deferred_request::follow_call() {
     });
 }
 
-// -- any ------------------------------------------------------------------------------------------------------------
-
-any_request::any_request(std::shared_ptr<request_router> by, const protocol::request_line& r, const identity& peer,
-                         std::shared_ptr<call> answers, time_point due)
+client_request::client_request(std::shared_ptr<request_router> by, const protocol::request_line& r,
+                               const identity& peer, std::shared_ptr<call> answers, time_point due)
     : deferred_request(std::move(by), std::move(answers), due), request_(r), peer_(peer),
       requester_(requester_of(routing_->host(), peer, r)) {}
+
+// -- any ------------------------------------------------------------------------------------------------------------
 
 bool any_request::begin(time_point now) {
     if (!retry_after_ && routing_->waits_for_discovery()) {
@@ -66,11 +66,20 @@ bool any_request::begin(time_point now) {
     }
     if (!chosen.nobody()) {
         ask(chosen, now);
-    } else if (!retry_after_ && routing_->expects_more()) {
+        return true;
+    }
+    if (!retry_after_ && routing_->expects_more()) {
         return false;
-    } else if (auto pool = next_pool(); !pool.empty()) {
-        ask_elsewhere(std::move(pool));
-    } else if (retry_after_) {
+    }
+    if (auto pool = next_pool(); !pool.empty()) {
+        idempotent_ = request_->verb == verb::pull; // of a task there, that is not known
+        ask_other(std::move(pool));
+        return true;
+    }
+    if (!retry_after_ && routing_->expects_nodes()) {
+        return false;
+    }
+    if (retry_after_) {
         give_up(retry_after_->reported, retry_after_->may_have_started);
     } else {
         call_->fail(routing_->no_provider(*request_));
@@ -80,20 +89,27 @@ bool any_request::begin(time_point now) {
 
 void any_request::ask(const load_balancer::chosen& chosen, time_point now) {
     idempotent_ = chosen.idempotent || request_->verb == verb::pull;
+    if (chosen.other != nullptr) {
+        ++chosen.other->given;
+        ask_other(chosen.other->name);
+        return;
+    }
+    note_asked(routing_->host().name);
+    part_.here = std::make_unique<local_request>(call_->host(), outcome(), call_->memory(), progress_to(call_));
+    part_.here->run(*request_, peer_, reply_due_, now);
+}
+
+void any_request::ask_other(std::string node) {
+    note_asked(std::move(node));
+    part_.ticket = routing_->send(*request_, requester_, asked_.back(), reply_due_, outcome(), progress_to(call_));
+}
+
+void any_request::note_asked(std::string node) {
     if (asked_.empty()) {
         follow_call();
     }
     part_ = {};
-    const auto then = outcome();
-    if (chosen.other != nullptr) {
-        asked_.push_back(chosen.other->name);
-        ++chosen.other->given;
-        part_.ticket = routing_->send(*request_, requester_, chosen.other->name, reply_due_, then, progress_to(call_));
-        return;
-    }
-    asked_.push_back(routing_->host().name);
-    part_.here = std::make_unique<local_request>(call_->host(), then, call_->memory(), progress_to(call_));
-    part_.here->run(*request_, peer_, reply_due_, now);
+    asked_.push_back(std::move(node));
 }
 
 subrequest_outcome any_request::outcome() {
@@ -114,19 +130,8 @@ std::string any_request::next_pool() const {
     return {};
 }
 
-void any_request::ask_elsewhere(std::string node) {
-    idempotent_ = request_->verb == verb::pull; // of a task there, that is not known
-    if (asked_.empty()) {
-        follow_call();
-    }
-    part_ = {};
-    asked_.push_back(std::move(node));
-    part_.ticket = routing_->send(*request_, requester_, asked_.back(), reply_due_, outcome(), progress_to(call_));
-}
-
 void any_request::continue_after_local_refusal(const protocol::failure& why) {
-    follow_call();
-    asked_.push_back(routing_->host().name);
+    note_asked(routing_->host().name);
     subrequest_failure failure{.reported = why, .may_have_started = false};
     on_outcome({}, &failure);
 }
@@ -205,11 +210,6 @@ void any_request::give_up(protocol::failure why, bool may_have_started) {
 
 // -- all ------------------------------------------------------------------------------------------------------------
 
-scatter_gather::scatter_gather(std::shared_ptr<request_router> by, const protocol::request_line& r,
-                               const identity& peer, std::shared_ptr<call> answers, time_point due)
-    : deferred_request(std::move(by), std::move(answers), due), request_(r), peer_(peer),
-      requester_(requester_of(routing_->host(), peer, r)) {}
-
 bool scatter_gather::begin(time_point now) {
     if (begun_ || over()) {
         return true;
@@ -220,12 +220,10 @@ bool scatter_gather::begin(time_point now) {
         }
         return false;
     }
-    ask_known(now);
-    return true;
+    return ask_known(now);
 }
 
-void scatter_gather::ask_known(time_point now) {
-    begun_ = true;
+bool scatter_gather::ask_known(time_point now) {
     routing_->host().deadlines.disarm(*this);
     const auto& r = *request_;
     const auto add = [this, &r](const std::string& node) {
@@ -244,12 +242,17 @@ void scatter_gather::ask_known(time_point now) {
         }
     }
     add_pools();
+    if (parts_.empty() && routing_->expects_nodes()) {
+        return false;
+    }
+    begun_ = true;
     if (parts_.empty()) {
         call_->fail(routing_->no_provider(r));
-        return;
+        return true;
     }
     std::sort(parts_.begin(), parts_.end(), [](const part& a, const part& b) { return a.node < b.node; });
     ask_all(now);
+    return true;
 }
 
 void scatter_gather::add_pools() {

@@ -53,6 +53,18 @@ class deferred_request : public std::enable_shared_from_this<deferred_request> {
     virtual void withdraw() = 0;
 };
 
+/// One that is sent to other nodes as it is.
+class client_request : public deferred_request {
+  public:
+    client_request(std::shared_ptr<request_router> by, const protocol::request_line& r, const identity& peer,
+                   std::shared_ptr<call> answers, time_point due);
+
+  protected:
+    protocol::owned_request request_;
+    const identity& peer_;        // valid until the call has ended
+    const std::string requester_; // whose rights apply
+};
+
 /// A request for a client at one node.
 struct attempt {
     std::uint64_t ticket = 0;              ///< of another node
@@ -62,13 +74,12 @@ struct attempt {
 /// A request for `any`: sends it to one node, and to another if that one cannot be reached or refuses the work before
 /// it starts. Work that has started and is lost is repeated only if that does no harm, and only once, so that a request
 /// that crashes its node does not go from node to node.
-class any_request final : public deferred_request {
+class any_request final : public client_request {
   public:
     /// The maximum number of busy nodes that are asked, so that repeats do not load a full network further.
     static constexpr int max_busy = 3;
 
-    any_request(std::shared_ptr<request_router> by, const protocol::request_line& r, const identity& peer,
-                std::shared_ptr<call> answers, time_point due);
+    using client_request::client_request;
 
     /// Sends the request to `chosen`.
     void ask(const load_balancer::chosen& chosen, time_point now);
@@ -79,7 +90,8 @@ class any_request final : public deferred_request {
 
   private:
     void withdraw() override { routing_->cancel(part_); }
-    void ask_elsewhere(std::string node);
+    void ask_other(std::string node);
+    void note_asked(std::string node);
     [[nodiscard]] subrequest_outcome outcome();
     [[nodiscard]] std::string next_pool() const;
     void on_outcome(std::string_view json, subrequest_failure* why);
@@ -88,9 +100,6 @@ class any_request final : public deferred_request {
     [[nodiscard]] bool may_repeat(const subrequest_failure& why) const noexcept;
     void note_end(const subrequest_failure* why);
 
-    protocol::owned_request request_;
-    const identity& peer_;           // valid until the call has ended
-    const std::string requester_;    // whose rights apply
     std::vector<std::string> asked_; // the last one is asked now
     attempt part_;                   // at that node
     bool idempotent_ = false;        // at that node
@@ -138,10 +147,9 @@ time_point stop_waiting_at(time_point due, time_point now);
 
 /// A request for `all`: sends it at once to all nodes that offer the task, and replies with their outcomes, at the
 /// latest shortly before the deadline.
-class scatter_gather final : public deferred_request, private deadline {
+class scatter_gather final : public client_request, private deadline {
   public:
-    scatter_gather(std::shared_ptr<request_router> by, const protocol::request_line& r, const identity& peer,
-                   std::shared_ptr<call> answers, time_point due);
+    using client_request::client_request;
 
     /// Sends the requests. Returns false if it has to wait for more nodes to be discovered.
     bool begin(time_point now) override;
@@ -154,18 +162,16 @@ class scatter_gather final : public deferred_request, private deadline {
 
     void on_outcome(part& at, std::string_view json, subrequest_failure* why);
     void on_deadline(time_point now) override;
-    void ask_known(time_point now);
+    /// Returns false if none is known, and seeds may still answer.
+    bool ask_known(time_point now);
     void add_pools();
     void ask_all(time_point now);
     void follow();
     void finish();
     void withdraw() override;
 
-    protocol::owned_request request_;
-    const identity& peer_;        // valid until the call has ended
-    const std::string requester_; // whose rights apply
-    std::vector<part> parts_;     // by name
-    std::size_t bytes_ = 0;       // of results
+    std::vector<part> parts_; // by name
+    std::size_t bytes_ = 0;   // of results
     bool begun_ = false;
     bool has_waited_ = false; // as long as permitted
     bool ended_ = false;

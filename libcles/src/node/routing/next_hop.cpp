@@ -5,6 +5,7 @@
 #include <cles/pending.hpp>
 #include <cles/routing.hpp>
 
+#include "node/base/peer_reply.hpp"
 #include "node/local_node.hpp"
 #include "node/publish/feed_machine.hpp"
 #include "node/routing/request_router.hpp"
@@ -75,8 +76,6 @@ class upstream_feed final : private detail::pending_event, public std::enable_sh
     void close();
 
   private:
-    class first_answer;
-
     // pending_event: this object always waits for the next event.
     bool deliver(const detail::raw_event& event) override;
     void fail(boost::system::error_code, std::string_view) override {}
@@ -84,45 +83,13 @@ class upstream_feed final : private detail::pending_event, public std::enable_sh
     [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
     void wait() { static_cast<void>(machine_.mail().next(pending_event_ptr{this})); }
+    void on_first_answer(const peer_answer& found);
     void on_refused(const protocol::failure& why);
     void release_later();
 
     std::shared_ptr<local_node> host_;
     feed_machine machine_;
     feed_events* to_; // null: closed
-};
-
-class upstream_feed::first_answer final : public detail::pending {
-  public:
-    explicit first_answer(std::weak_ptr<upstream_feed> to) : to_(std::move(to)) {}
-
-    verdict offer(std::string_view json) override {
-        const std::unique_ptr<first_answer> self{this};
-        if (const auto alive = to_.lock(); alive && alive->to_ != nullptr) {
-            alive->to_->on_bound(json);
-        }
-        return verdict::completed;
-    }
-    void fail(boost::system::error_code code, std::string_view message) override {
-        const std::unique_ptr<first_answer> self{this};
-        if (const auto alive = to_.lock()) {
-            alive->on_refused(failure_of(code, alive->machine_.target(), message));
-        }
-    }
-    void refuse(boost::system::error_code, std::string_view, std::string_view answer) override {
-        const std::unique_ptr<first_answer> self{this};
-        if (const auto alive = to_.lock()) {
-            protocol::failure why;
-            protocol::parse_failure(answer, why);
-            why.answer = answer;
-            alive->on_refused(why);
-        }
-    }
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return false; }
-
-  private:
-    std::weak_ptr<upstream_feed> to_;
 };
 
 void upstream_feed::begin(std::string_view adverbs) {
@@ -135,7 +102,26 @@ void upstream_feed::begin(std::string_view adverbs) {
                           .via = std::string{value_in(adverbs, "via=")},
                           .requester = std::string{value_in(adverbs, "from=")}});
     wait();
-    machine_.start(detail::pending_ptr{new first_answer(weak_from_this())});
+    machine_.start(detail::pending_ptr{new peer_reply{[weak = weak_from_this()](const peer_answer& found) {
+        if (const auto self = weak.lock()) {
+            self->on_first_answer(found);
+        }
+    }}});
+}
+
+void upstream_feed::on_first_answer(const peer_answer& found) {
+    if (!found.code) {
+        if (to_ != nullptr) {
+            to_->on_bound(found.json);
+        }
+    } else if (found.refusal.empty()) {
+        on_refused(failure_of(found.code, machine_.target(), found.message));
+    } else {
+        protocol::failure why;
+        protocol::parse_failure(found.refusal, why);
+        why.answer = found.refusal;
+        on_refused(why);
+    }
 }
 
 void upstream_feed::close() {
@@ -183,8 +169,8 @@ class peer_next_hop : public next_hop {
             return 0;
         }
         const auto requester = host_.node().security ? value_in(r.adverbs, "from=") : std::string_view{};
-        return host_.peer_channels().send(r.target(), {}, r, deadline, std::move(reply), std::move(progress),
-                                          {.via = via, .requester = requester});
+        return host_.peer_channels().send({.target = r.target(), .by = {.via = via, .requester = requester}}, r,
+                                          deadline, std::move(reply), std::move(progress));
     }
     void cancel(std::uint64_t ticket) override { host_.cancel(ticket); }
     std::shared_ptr<void> bind(std::string_view node, std::string_view path, std::string_view adverbs,
@@ -235,11 +221,11 @@ std::size_t count_adverbs(std::string_view adverbs) noexcept {
     return count;
 }
 
-// As many for each verb but BIND, which has more adverbs. docs/protocol.md states how many unknown ones that leaves.
+// The same for each verb but BIND, which has more adverbs. docs/protocol.md states how many unknown ones that leaves.
 std::size_t max_further_adverbs(const protocol::request_line& r) noexcept {
     const auto written = std::max(protocol::max_written_adverbs(r.verb), protocol::max_written_adverbs(verb::delegate));
-    const std::size_t others = 1 + (r.trace ? 0 : 1); // `hops` is a further one here, and `trace` is seldom there
-    return protocol::max_adverbs - (written - others);
+    const std::size_t not_written = 1 + (r.trace ? 0 : 1); // `hops`, which is one of the further ones, and `trace`
+    return protocol::max_adverbs - (written - not_written);
 }
 
 } // namespace cles::core

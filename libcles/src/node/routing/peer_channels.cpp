@@ -278,8 +278,8 @@ std::string peer_channels::tls_address_of(std::string_view node) const {
     if (configured != directory_.end() && configured->second.starts_with("tls://")) {
         return configured->second;
     }
-    if (const auto* const known = host_.node().peers.endpoints_of(node)) {
-        for (const auto& endpoint : *known) {
+    if (const auto* const known = host_.node().peers.owner(node)) {
+        for (const auto& endpoint : known->endpoints) {
             if (endpoint.starts_with("tls://")) {
                 return endpoint;
             }
@@ -291,34 +291,33 @@ std::string peer_channels::tls_address_of(std::string_view node) const {
     return {};
 }
 
-peer_channel* peer_channels::to(std::string_view target, std::string_view at, bool urgent,
-                                boost::system::error_code& code, std::string& why, const forwarding& by) {
-    if (!at.empty() || urgent || !by.empty()) {
-        return find({.target = target, .at = at, .urgent = urgent, .by = by}, code, why);
+peer_channel* peer_channels::to(const destination& where, boost::system::error_code& code, std::string& why) {
+    if (!where.at.empty() || where.urgent || !where.by.empty()) {
+        return find(where, code, why);
     }
-    if (recent_ == nullptr || recent_target_ != target) {
-        recent_ = find({.target = target}, code, why);
-        recent_target_ = target;
+    if (recent_ == nullptr || recent_target_ != where.target) {
+        recent_ = find(where, code, why);
+        recent_target_ = where.target;
     }
     return recent_;
 }
 
-std::uint64_t peer_channels::send(std::string_view target, std::string_view at, protocol::outgoing_request r,
-                                  time_point deadline, detail::pending_ptr operation,
-                                  outbound::progress_function progress, const forwarding& by) {
+std::uint64_t peer_channels::send(destination where, protocol::outgoing_request r, time_point deadline,
+                                  detail::pending_ptr operation, outbound::progress_function progress) {
+    where.urgent = r.carried.urgent;
     if (r.carried.trace.sampled) {
-        operation = record(r, at, by, std::move(operation));
+        operation = record(r, where.at, where.by, std::move(operation));
     }
     boost::system::error_code code;
     std::string why;
-    auto* channel = to(target, at, r.carried.urgent, code, why, by);
+    auto* channel = to(where, code, why);
     if (channel == nullptr) {
         host_.fail_later(std::move(operation), code, std::move(why), std::move(progress));
         return 0;
     }
     r.id = host_.draw_id();
     channel->send(r, deadline, host_.now(), std::move(operation), std::move(progress),
-                  at.empty() && by.empty() && !r.carried.urgent);
+                  where.at.empty() && where.by.empty() && !where.urgent);
     return r.id;
 }
 
@@ -339,19 +338,6 @@ std::string peer_channels::neighbour_towards(std::string_view target, const forw
     } catch (const error&) { // it is not known
         return {};
     }
-}
-
-void peer_channels::send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r,
-                                 time_point deadline, detail::pending_ptr operation) {
-    boost::system::error_code code;
-    std::string why;
-    auto* channel = find({.target = name, .at = at, .expected = name}, code, why);
-    if (channel == nullptr) {
-        host_.fail_later(std::move(operation), code, std::move(why), {});
-        return;
-    }
-    r.id = host_.draw_id();
-    channel->send(r, deadline, host_.now(), std::move(operation), {});
 }
 
 peer_channels::place peer_channels::place_of(std::string_view target, const forwarding& by) const {
@@ -424,7 +410,7 @@ void peer_channels::on_dialled(peer_channel& channel, boost::system::error_code 
     if (!code) {
         routes->reach().on_opened(channel.node());
     } else if (code != errc::denied && code != boost::system::errc::too_many_files_open) { // the link is not to blame
-        routes->reach().on_unreachable(channel.node(), host_.now());
+        routes->reach().lose(channel.node(), host_.now());
         reroute(channel);
     }
 }
@@ -500,7 +486,7 @@ void peer_channels::on_address_changed(std::string_view node) {
     channels_.erase(waiting);
     boost::system::error_code code;
     std::string why;
-    if (auto* channel = to(node, {}, false, code, why)) {
+    if (auto* channel = to({.target = node}, code, why)) {
         held->hand_over(*channel);
     } else {
         held->fail(code, why);

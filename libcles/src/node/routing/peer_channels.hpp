@@ -130,20 +130,24 @@ class peer_channels {
 
     /// Configures the URL of a node; an empty URL removes it. \throws cles::error
     void set_peer(std::string_view name, std::string_view where);
-    /// The channel to a target, or null with the reason in `code` and `why`. It may only hold requests for a node that
-    /// is not discovered yet. Urgent requests have links of their own.
-    peer_channel* to(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
-                     std::string& why, const forwarding& by = {});
-    /// Sends a request to a target, or to `at` if it is not empty, and gives it an id. Without a channel that leads
-    /// there, the operation fails later. Returns the id, or 0.
-    std::uint64_t send(std::string_view target, std::string_view at, protocol::outgoing_request r, time_point deadline,
-                       detail::pending_ptr operation, outbound::progress_function progress, const forwarding& by = {});
+    /// Where requests are sent.
+    struct destination {
+        std::string_view target;
+        std::string_view at{};       ///< empty: wherever the target is
+        bool urgent = false;         ///< such requests have links of their own
+        std::string_view expected{}; ///< the only node that may answer at `at`; empty: any
+        forwarding by{};
+    };
+    /// The channel that leads there, or null with the reason in `code` and `why`. It may only hold requests for a node
+    /// that is not discovered yet.
+    peer_channel* to(const destination& where, boost::system::error_code& code, std::string& why);
+    /// Sends a request there, by the urgent link if the request is urgent, and gives it an id. Without a channel that
+    /// leads there, the operation fails later. Returns the id, or 0.
+    std::uint64_t send(destination where, protocol::outgoing_request r, time_point deadline,
+                       detail::pending_ptr operation, outbound::progress_function progress = {});
     /// Begins the span of a traced request that is about to be sent; returns the operation that ends it.
     [[nodiscard, gnu::cold]] detail::pending_ptr record(protocol::outgoing_request& r, std::string_view at,
                                                         const forwarding& by, detail::pending_ptr operation);
-    /// As `send`, to an address where only the node of that name is to answer.
-    void send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r, time_point deadline,
-                      detail::pending_ptr operation);
     /// The address of the node has become known, unknown, or another.
     void on_address_changed(std::string_view node);
     /// Requests for the node are sent elsewhere: moves those that wait for a link.
@@ -167,7 +171,7 @@ class peer_channels {
 
     /// `c` was lost or can no longer be used.
     void drop(const connection& c);
-    /// No requests follow at that URL for a while: closes its idle links. `name`: as passed to `send_to_node`.
+    /// No requests follow at that URL for a while: closes its idle links. `name`: of the only node that may answer.
     void release(std::string_view url, std::string_view name = {});
     /// Stops dialling, and fails the waiting requests.
     void stop();
@@ -185,14 +189,6 @@ class peer_channels {
     url checked_url(std::string_view where) const;
     [[nodiscard]] std::string_view name_to_check(std::string_view target, std::string_view at,
                                                  std::string_view address) const;
-    /// What a request is sent by.
-    struct destination {
-        std::string_view target;
-        std::string_view at{}; ///< empty: wherever the target is
-        bool urgent = false;
-        std::string_view expected{}; ///< the node that must answer at `at`, if any
-        forwarding by{};
-    };
     void reroute(peer_channel& channel);
     peer_channel* find(const destination& to, boost::system::error_code& code, std::string& why);
 

@@ -8,13 +8,6 @@
 #include <utility>
 
 namespace cles::core {
-namespace {
-
-bool has(const std::vector<std::string>& all, std::string_view one) {
-    return std::find(all.begin(), all.end(), one) != all.end();
-}
-
-} // namespace
 
 std::string relayed_path::key(std::string_view node) const {
     auto made = std::string{node}.append(":").append(text);
@@ -278,7 +271,7 @@ topic* relayed_bindings::take_own_part(std::string_view path, binding::terms wan
     if (!own_.has(path)) {
         own_by_all_.emplace_back(path);
     }
-    if (has(own_by_all_, path)) {
+    if (std::ranges::find(own_by_all_, path) != own_by_all_.end()) {
         own_.bind(t, wanted);
     }
     return &t;

@@ -151,8 +151,9 @@ void request_router::begin(std::shared_ptr<deferred_request> e, time_point now) 
     }
 }
 
-void request_router::release() {
+void request_router::release(bool expects_nodes) {
     waits_for_discovery_ = false;
+    expects_nodes_ = expects_nodes;
     on_offers();
 }
 

@@ -44,7 +44,7 @@ class request_router : public router, public std::enable_shared_from_this<reques
     std::shared_ptr<relays> relayed() override { return relays_; }
     [[nodiscard]] const service_registry& registry() const noexcept override { return service_registry_; }
     void hold() noexcept override { waits_for_discovery_ = true; }
-    void release() override;
+    void release(bool expects_nodes) override;
     void begin_ready(time_point now) override;
     void stop() final;
 
@@ -70,6 +70,8 @@ class request_router : public router, public std::enable_shared_from_this<reques
     [[nodiscard]] bool expects_more() const noexcept {
         return waits_for_discovery_ || service_registry_.expects_more();
     }
+    /// Whether seeds may still answer: a request without a provider waits.
+    [[nodiscard]] bool expects_nodes() const noexcept { return expects_nodes_; }
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
     [[nodiscard]] protocol::failure no_provider(const protocol::request_line& r) const;
     /// It has been forwarded as often as it may be.
@@ -91,6 +93,7 @@ class request_router : public router, public std::enable_shared_from_this<reques
     std::function<void()> wake_;
     std::vector<std::weak_ptr<all_binding>> all_;
     bool waits_for_discovery_ = false;
+    bool expects_nodes_ = false;
     bool stopped_ = false;
 };
 

@@ -47,8 +47,9 @@ class router {
 
     /// `any` and `all` wait, because discovery is still in progress.
     virtual void hold() = 0;
-    /// Discovery is over.
-    virtual void release() = 0;
+    /// Discovery is over. `expects_nodes`: except that seeds may still answer, for which requests wait that no known
+    /// node serves.
+    virtual void release(bool expects_nodes) = 0;
     /// Starts the requests that are ready. Call it in a turn, since handlers of this node run.
     virtual void begin_ready(time_point now) = 0;
     /// Sends no more requests.

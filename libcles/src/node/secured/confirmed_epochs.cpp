@@ -22,11 +22,10 @@ void confirmed_epochs::confirm(std::string_view node, confirmed_epoch said, time
 
 time_point confirmed_epochs::next_question(std::string_view node) const noexcept {
     const auto found = nodes_.find(node);
-    return found == nodes_.end() || found->second.asked == time_point::min() ? time_point::min()
-                                                                             : found->second.asked + pause;
+    return found == nodes_.end() ? time_point::min() : found->second.next_question;
 }
 
-void confirmed_epochs::on_asked(std::string_view node, time_point now) { of(node, now).asked = now; }
+void confirmed_epochs::on_asked(std::string_view node, time_point now) { of(node, now).next_question = now + pause; }
 
 confirmed_epochs::entry& confirmed_epochs::of(std::string_view node, time_point now) {
     auto at = nodes_.find(node);

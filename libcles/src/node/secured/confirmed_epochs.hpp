@@ -43,7 +43,7 @@ class confirmed_epochs {
   private:
     struct entry {
         std::optional<confirmed_epoch> said{};
-        time_point asked = time_point::min();
+        time_point next_question = time_point::min();
         time_point used{};
     };
 

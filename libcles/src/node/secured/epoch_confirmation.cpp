@@ -6,7 +6,7 @@
 
 #include "json/json_members.hpp"
 #include "node/node_state.hpp"
-#include "node/secured/own_announcement.hpp"
+#include "node/secured/signed_announcer.hpp"
 #include "port/node_security.hpp"
 
 #include <algorithm>
@@ -38,25 +38,16 @@ std::string epoch_question(std::string_view node, std::string_view challenge) {
 
 std::optional<confirmed_epoch> read_confirmed_epoch(std::string_view json, std::string_view node,
                                                     std::string_view challenge, const node_security& security) {
-    std::string_view body;
-    std::string sig;
-    std::uint64_t seq = 0;
-    std::uint32_t epoch = 0;
-    bool has_epoch = false;
+    signed_entry entry;
     json_reader r{json, reply_depth};
-    const bool good = read_members(r, [&](std::string_view key) {
-        return key == "announced" ? r.read_raw(body)
-               : key == "epoch"   ? (has_epoch = read_epoch(r, epoch))
-               : key == "seq"     ? r.read(seq)
-               : key == "sig"     ? r.read(sig)
-                                  : r.skip();
-    });
+    const bool good = read_members(r, [&](std::string_view key) { return read_signed_member(r, key, entry); });
     announcement said;
-    if (!good || !has_epoch || !read_announcement(body, said) || said.node != node ||
-        !security.is_signed(node, path_of(challenge), seq, protocol::epoch_text(epoch), body, sig)) {
+    if (!good || !entry.epoch || !read_announcement(entry.body, said) || said.node != node ||
+        !security.is_signed(node, path_of(challenge), entry.seq, protocol::epoch_text(*entry.epoch), entry.body,
+                            entry.sig)) {
         return {};
     }
-    return confirmed_epoch{epoch, std::move(said.signed_tasks)};
+    return confirmed_epoch{*entry.epoch, std::move(said.signed_tasks)};
 }
 
 // What it announces to others now, also if it has nobody to announce it to.
@@ -74,11 +65,7 @@ void serve_announced(node_state& host, reply_writer& replies, const protocol::re
     const auto made = sign_announcement(said, path_of(challenge), seq, host.epoch, *host.security);
     replies.write(r, [&](json_writer& w) {
         w.begin_object();
-        w.plain_key("announced");
-        w.raw(made->body);
-        write_member(w, "seq", seq);
-        write_member(w, "epoch", std::string_view{host.epoch});
-        write_member(w, "sig", std::string_view{made->sig});
+        write_signed_members(w, *made, seq, host.epoch);
         w.end_object();
     });
 }

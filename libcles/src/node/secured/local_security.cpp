@@ -60,13 +60,17 @@ void local_security::on_unanswered(std::string_view name, const std::vector<std:
 void local_security::ask_for_roster(std::string_view node, std::uint32_t version, time_point now) {
     const auto& host = host_.shared_node();
     if (host->security->wants_roster(node, version, now)) {
-        const auto noun = std::string{node} + ":cles/roster";
         auto& channels = host_.peer_channels();
         const auto at = channels.is_by_datagram(node) ? channels.tls_address_of(node) : std::string{};
-        channels.send(node, at, {.verb = verb::pull, .noun = noun},
-                      now + std::chrono::milliseconds{protocol::default_deadline_ms},
-                      make_roster_reply(host, std::string{node}), {});
+        pull_roster(node, at, make_roster_reply(host, std::string{node}));
     }
+}
+
+void local_security::pull_roster(std::string_view node, std::string_view at, detail::pending_ptr reply) {
+    const auto noun = std::string{node} + ":cles/roster";
+    host_.peer_channels().send({.target = node, .at = at}, {.verb = verb::pull, .noun = noun},
+                               host_.now() + std::chrono::milliseconds{protocol::default_deadline_ms},
+                               std::move(reply));
 }
 
 void local_security::visit(std::string_view node) {
@@ -76,13 +80,10 @@ void local_security::visit(std::string_view node) {
 }
 
 void local_security::visit(std::string_view node, const std::string& url) {
-    const auto noun = std::string{node} + ":cles/roster";
-    const auto release = [url](local_node& host, const peer_answer&) {
+    auto release = host_.reply_while_running([url](local_node& host, const peer_answer&) {
         host.post_while_running([url](local_node& alive) { alive.peer_channels().release(url); });
-    };
-    host_.peer_channels().send(node, url, {.verb = verb::pull, .noun = noun},
-                               host_.now() + std::chrono::milliseconds{protocol::default_deadline_ms},
-                               detail::pending_ptr{new peer_reply{host_.weak_from_this(), release}}, {});
+    });
+    pull_roster(node, url, std::move(release));
 }
 
 void local_security::on_due(time_point at) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/pending.hpp>
+
 #include "node/base/deadlines.hpp"
 #include "port/node_security.hpp"
 
@@ -39,6 +41,7 @@ class local_security final : private security_observer, private deadline {
     void on_deadline(time_point now) override;
 
     void apply_change();
+    void pull_roster(std::string_view node, std::string_view at, detail::pending_ptr reply);
     void visit(std::string_view node, const std::string& url);
 
     local_node& host_;

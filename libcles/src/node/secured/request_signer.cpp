@@ -2,6 +2,7 @@
 #include "node/secured/request_signer.hpp"
 
 #include "json/json_members.hpp"
+#include "node/base/peer_reply.hpp"
 #include "node/local_node.hpp"
 #include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
@@ -84,7 +85,7 @@ void send_signed(local_node& host, request_signer& by, const repeatable_request&
     const auto adverbs = std::string{"sig="}.append(sig);
     host.flush_scheduler().run_user_call([&] {
         const auto id = host.peer_channels().send(
-            to, r.at,
+            {.target = to, .at = r.at},
             {.verb = r.how, .noun = noun, .carried = r.carried, .hops = r.hops, .adverbs = adverbs, .body = r.body},
             r.deadline, std::move(reply), std::move(progress));
         if (id != 0) {
@@ -108,49 +109,6 @@ class noted_ticket {
   private:
     std::weak_ptr<request_signer> by_;
     std::uint64_t ticket_;
-};
-
-/// One attempt of a request, which passes its outcome on to the operation.
-class attempt_of_request : public detail::pending {
-  public:
-    explicit attempt_of_request(detail::pending_ptr operation) : operation_(std::move(operation)) {}
-    attempt_of_request(const attempt_of_request&) = delete;
-    attempt_of_request& operator=(const attempt_of_request&) = delete;
-    virtual ~attempt_of_request() = default;
-
-    verdict offer(std::string_view json) override {
-        std::unique_ptr<attempt_of_request> self{this};
-        auto* const operation = operation_.release();
-        const auto found = operation->offer(json);
-        if (found == verdict::malformed) {
-            operation_.reset(operation);
-            static_cast<void>(self.release());
-        }
-        return found;
-    }
-    void fail(boost::system::error_code code, std::string_view message) override {
-        const std::unique_ptr<attempt_of_request> self{this};
-        operation_.release()->fail(code, message);
-    }
-    void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override {
-        const std::unique_ptr<attempt_of_request> self{this};
-        operation_.release()->refuse(code, message, answer);
-    }
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return operation_->calls_user(); }
-
-  protected:
-    detail::pending_ptr operation_;
-};
-
-/// Whatever its outcome is, there is no third one.
-class second_attempt final : public attempt_of_request {
-  public:
-    second_attempt(const repeatable_request& r, detail::pending_ptr operation)
-        : attempt_of_request(std::move(operation)), ticket_(r.signer, r.ticket) {}
-
-  private:
-    noted_ticket ticket_;
 };
 
 /// The reply to a request for `all` while nodes in it are asked once more, with the signature.
@@ -182,32 +140,32 @@ class gathered_reply {
         operation_ = std::move(operation);
         open_ = open;
     }
-    void on_result(const std::string& node, std::string_view json) {
-        errors_.erase(node);
-        results_.insert_or_assign(node, std::string{json});
-        finish_one();
-    }
-    void on_cancelled(std::string_view message) {
-        if (const auto host = host_.lock(); host && operation_) {
-            host->completions().fail(std::move(operation_), errc::cancelled, message);
+    void on_outcome(const std::string& node, const peer_answer& found) {
+        const auto host = host_.lock();
+        if (!found.code) {
+            errors_.erase(node);
+            results_.insert_or_assign(node, std::string{found.json});
+        } else if (!found.refusal.empty()) {
+            errors_.insert_or_assign(node, std::string{found.refusal});
+        } else if (found.code == errc::cancelled) {
+            if (host && operation_) {
+                host->completions().fail(std::move(operation_), errc::cancelled, found.message);
+            }
+            return;
+        } else {
+            const bool ours = found.code.category() == error_category();
+            errors_.insert_or_assign(
+                node, failure_text({.code = ours ? static_cast<errc>(found.code.value()) : errc::unavailable,
+                                    .message = node + ": " + std::string{found.message}}));
         }
-    }
-    void on_error(const std::string& node, std::string_view json) {
-        errors_.insert_or_assign(node, std::string{json});
-        finish_one();
+        if (--open_ == 0 && host && operation_) {
+            host->completions().succeed(std::move(operation_), text());
+        }
     }
 
   private:
     using outcomes = std::map<std::string, std::string>;
 
-    void finish_one() {
-        if (--open_ != 0) {
-            return;
-        }
-        if (const auto host = host_.lock(); host && operation_) {
-            host->completions().succeed(std::move(operation_), text());
-        }
-    }
     static std::string members(const outcomes& all) {
         std::string text;
         for (const auto& [node, json] : all) {
@@ -227,63 +185,40 @@ class gathered_reply {
     std::size_t open_ = 0;
 };
 
-class part_of_gathered final : public detail::pending {
+/// One attempt of a request: completes its operation, unless it is the first one and the reply asks for a signature.
+class attempt_of_request final : public detail::pending {
   public:
-    part_of_gathered(std::shared_ptr<gathered_reply> whole, std::string node)
-        : whole_(std::move(whole)), node_(std::move(node)) {}
+    attempt_of_request(repeatable_request r, detail::pending_ptr operation)
+        : request_(std::move(r)), operation_(std::move(operation)) {}
+    /// The second one. Whatever its outcome is, there is no third.
+    attempt_of_request(std::weak_ptr<request_signer> signer, std::uint64_t ticket, detail::pending_ptr operation)
+        : repeated_(std::in_place, std::move(signer), ticket), operation_(std::move(operation)) {}
 
     verdict offer(std::string_view json) override {
-        if (!detail::is_valid_answer(json)) {
-            return verdict::malformed;
-        }
-        const std::unique_ptr<part_of_gathered> self{this};
-        whole_->on_result(node_, json);
-        return verdict::completed;
-    }
-    void fail(boost::system::error_code code, std::string_view message) override {
-        const std::unique_ptr<part_of_gathered> self{this};
-        if (code == errc::cancelled) {
-            whole_->on_cancelled(message);
-            return;
-        }
-        const bool ours = code.category() == error_category();
-        whole_->on_error(node_, failure_text({.code = ours ? static_cast<errc>(code.value()) : errc::unavailable,
-                                              .message = node_ + ": " + std::string{message}}));
-    }
-    void refuse(boost::system::error_code, std::string_view, std::string_view answer) override {
-        const std::unique_ptr<part_of_gathered> self{this};
-        whole_->on_error(node_, answer);
-    }
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return false; }
-
-  private:
-    std::shared_ptr<gathered_reply> whole_;
-    std::string node_;
-};
-
-/// Completes its operation, unless the reply asks for a signature.
-class first_attempt final : public attempt_of_request {
-  public:
-    first_attempt(repeatable_request r, detail::pending_ptr operation)
-        : attempt_of_request(std::move(operation)), request_(std::move(r)) {}
-
-    verdict offer(std::string_view json) override {
-        std::unique_ptr<first_attempt> self{this};
-        if (request_.target == "all" && gather(json)) {
+        std::unique_ptr<attempt_of_request> self{this};
+        if (!repeated_ && request_.target == "all" && gather(json)) {
             return verdict::completed;
         }
-        static_cast<void>(self.release());
-        return attempt_of_request::offer(json);
+        auto* const operation = operation_.release();
+        const auto found = operation->offer(json);
+        if (found == verdict::malformed) {
+            operation_.reset(operation);
+            static_cast<void>(self.release());
+        }
+        return found;
+    }
+    void fail(boost::system::error_code code, std::string_view message) override {
+        const std::unique_ptr<attempt_of_request> self{this};
+        operation_.release()->fail(code, message);
     }
     void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override {
-        std::unique_ptr<first_attempt> self{this};
-        if (code == errc::denied && repeat(answer)) {
-            return;
+        const std::unique_ptr<attempt_of_request> self{this};
+        if (repeated_ || code != errc::denied || !repeat(answer)) {
+            operation_.release()->refuse(code, message, answer);
         }
-        static_cast<void>(self.release());
-        attempt_of_request::refuse(code, message, answer);
     }
+    void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return operation_->calls_user(); }
 
   private:
     bool repeat(std::string_view answer) {
@@ -297,9 +232,8 @@ class first_attempt final : public attempt_of_request {
         if (!node) {
             return false;
         }
-        send_signed(*host, *signer, request_, *node, sig,
-                    detail::pending_ptr{new second_attempt(request_, std::move(operation_))},
-                    std::move(request_.progress));
+        detail::pending_ptr second{new attempt_of_request(request_.signer, request_.ticket, std::move(operation_))};
+        send_signed(*host, *signer, request_, *node, sig, std::move(second), std::move(request_.progress));
         return true;
     }
 
@@ -325,13 +259,16 @@ class first_attempt final : public attempt_of_request {
         }
         whole->take(std::move(operation_), signatures.size());
         for (const auto& [node, sig] : signatures) {
-            send_signed(*host, *signer, request_, node, sig, detail::pending_ptr{new part_of_gathered(whole, node)},
+            auto then = [whole, node = node](const peer_answer& found) { whole->on_outcome(node, found); };
+            send_signed(*host, *signer, request_, node, sig, detail::pending_ptr{new peer_reply{std::move(then), true}},
                         {});
         }
         return true;
     }
 
-    repeatable_request request_;
+    repeatable_request request_{};
+    std::optional<noted_ticket> repeated_; // of the second attempt only
+    detail::pending_ptr operation_;
 };
 
 } // namespace
@@ -340,19 +277,19 @@ detail::pending_ptr request_signer::watch(const outgoing_call& r, detail::pendin
     if (r.noun.task == "cles") { // never signed
         return operation;
     }
-    return detail::pending_ptr{new first_attempt({.host = host_.weak_from_this(),
-                                                  .signer = weak_from_this(),
-                                                  .how = r.how,
-                                                  .target = std::string{r.noun.target},
-                                                  .path = std::string{r.noun.path},
-                                                  .body = std::string{protocol::trim(r.body)},
-                                                  .at = r.options.at_,
-                                                  .carried = r.carried,
-                                                  .hops = r.options.hops_,
-                                                  .progress = r.options.on_progress_,
-                                                  .deadline = r.deadline,
-                                                  .ticket = r.ticket},
-                                                 std::move(operation))};
+    return detail::pending_ptr{new attempt_of_request(repeatable_request{.host = host_.weak_from_this(),
+                                                                         .signer = weak_from_this(),
+                                                                         .how = r.how,
+                                                                         .target = std::string{r.noun.target},
+                                                                         .path = std::string{r.noun.path},
+                                                                         .body = std::string{protocol::trim(r.body)},
+                                                                         .at = r.options.at_,
+                                                                         .carried = r.carried,
+                                                                         .hops = r.options.hops_,
+                                                                         .progress = r.options.on_progress_,
+                                                                         .deadline = r.deadline,
+                                                                         .ticket = r.ticket},
+                                                      std::move(operation))};
 }
 
 bool request_signer::cancel(std::uint64_t ticket) {

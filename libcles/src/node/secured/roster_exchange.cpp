@@ -5,6 +5,7 @@
 #include <cles/json_writer.hpp>
 
 #include "json/json_members.hpp"
+#include "node/base/peer_reply.hpp"
 #include "port/node_security.hpp"
 
 #include <cstdint>
@@ -40,35 +41,15 @@ bool wants_stated_roster(const node_state& n, const identity& peer, const protoc
            n.security->wants_roster(peer.name, static_cast<std::uint32_t>(version), now);
 }
 
-namespace {
-
-class roster_reply final : public detail::pending {
-  public:
-    roster_reply(std::shared_ptr<node_state> host, std::string from) : host_(std::move(host)), from_(std::move(from)) {}
-
-    verdict offer(std::string_view json) override {
-        const std::unique_ptr<roster_reply> self{this};
-        if (const auto why = host_->security->offer_roster(json)) {
-            host_->post_log(log_level::warning, "refused the roster of " + from_ + ": " + *why);
-        }
-        return verdict::completed;
-    }
-    void fail(boost::system::error_code, std::string_view message) override {
-        const std::unique_ptr<roster_reply> self{this};
-        host_->post_log(log_level::debug, "did not get the roster of " + from_ + ": " + std::string{message});
-    }
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return false; }
-
-  private:
-    std::shared_ptr<node_state> host_;
-    std::string from_;
-};
-
-} // namespace
-
 detail::pending_ptr make_roster_reply(std::shared_ptr<node_state> host, std::string from) {
-    return detail::pending_ptr{new roster_reply(std::move(host), std::move(from))};
+    auto then = [host = std::move(host), from = std::move(from)](const peer_answer& found) {
+        if (found.code) {
+            host->post_log(log_level::debug, "did not get the roster of " + from + ": " + std::string{found.message});
+        } else if (const auto why = host->security->offer_roster(found.json)) {
+            host->post_log(log_level::warning, "refused the roster of " + from + ": " + *why);
+        }
+    };
+    return detail::pending_ptr{new peer_reply{std::move(then)}};
 }
 
 void serve_roster(node_state& host, reply_writer& replies, const protocol::request_line& r) {

@@ -2,7 +2,6 @@
 #include "node/secured/secured_link.hpp"
 
 #include "node/secured/roster_exchange.hpp"
-#include "node/secured/signed_updates.hpp"
 #include "protocol/request_line.hpp"
 
 #include <chrono>
@@ -39,21 +38,17 @@ bool secured_link::admits(const protocol::request_line& update) {
         unconfirmed_->hold(update, node_->time.now());
         return false;
     }
-    if (check_signature(*node_, confirmed_, update, peer_.name == update.noun.target) == update_check::refused) {
+    if (node_->secured->check(update, peer_.name == update.noun.target) == update_check::refused) {
         ++node_->counts.updates_unsigned;
         return false;
     }
-    if (is_confirmed(update)) {
+    // The peer has stated its own epoch when it proved its name. What it passes on may be of an earlier incarnation.
+    if (update.noun.target == peer_.name || peer_.name == node_->name ||
+        confirmed_.contain(update.noun.target, *update.epoch)) {
         return true;
     }
     unconfirmed_->hold(update, node_->time.now());
     return false;
-}
-
-// The peer has stated its own epoch when it proved its name. What it passes on may be of an earlier incarnation.
-bool secured_link::is_confirmed(const protocol::request_line& update) const noexcept {
-    return update.noun.target == peer_.name || peer_.name == node_->name ||
-           confirmed_.contain(update.noun.target, *update.epoch);
 }
 
 void secured_link::send_hello() {

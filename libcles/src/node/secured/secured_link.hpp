@@ -24,8 +24,6 @@ class secured_link final : public link_security {
     void send_hello() override;
 
   private:
-    [[nodiscard]] bool is_confirmed(const protocol::request_line& update) const noexcept;
-
     std::shared_ptr<node_state> node_;
     confirmed_epochs& confirmed_;
     line_sink& out_;

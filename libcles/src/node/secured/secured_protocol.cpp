@@ -5,13 +5,16 @@
 
 #include "node/local_node.hpp"
 #include "node/secured/epoch_confirmation.hpp"
-#include "node/secured/own_announcement.hpp"
 #include "node/secured/roster_exchange.hpp"
 #include "node/secured/secured_link.hpp"
-#include "node/secured/signed_updates.hpp"
+#include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
+#include "protocol/grammar.hpp"
 
+#include <algorithm>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace cles::core {
 
@@ -66,11 +69,33 @@ bool secured_protocol::serve_reserved(reply_writer& replies, const protocol::req
 }
 
 std::optional<bool> secured_protocol::must_be_signed(std::string_view publisher, std::string_view task) const {
-    return core::must_be_signed(node_, confirmed_, publisher, task);
+    if (publisher == node_.name) {
+        return node_.tasks.is_signed(task);
+    }
+    const auto contains = [task](const std::vector<std::string>& tasks) {
+        return std::ranges::find(tasks, task) != tasks.end();
+    };
+    if (const auto* const run = node_.peers.owner(publisher)) {
+        return contains(run->announced.signed_tasks);
+    }
+    const auto* const said = confirmed_.find(publisher);
+    return said != nullptr && said->signed_tasks ? std::optional{contains(*said->signed_tasks)} : std::nullopt;
 }
 
 update_check secured_protocol::check(const protocol::request_line& update, bool direct) const {
-    return check_signature(node_, confirmed_, update, direct);
+    const auto must = must_be_signed(update.noun.target, update.noun.task);
+    if (!must && !direct) {
+        return update_check::refused;
+    }
+    if (!must.value_or(false) && update.sig.empty()) {
+        return update_check::unsigned_one;
+    }
+    std::string scratch;
+    const auto path = protocol::canonical_path(update.noun, scratch);
+    return node_.security->is_signed(member_of(node_, update.noun.target), path, *update.seq,
+                                     protocol::epoch_text(*update.epoch), update.body, update.sig)
+               ? update_check::signed_one
+               : update_check::refused;
 }
 
 std::string secured_protocol::announce(announcement& said, std::uint64_t& seq, bool in_group, bool by_gossip) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/secured/unconfirmed_updates.hpp"
 
+#include "node/base/peer_reply.hpp"
 #include "node/secured/epoch_confirmation.hpp"
 #include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
@@ -10,35 +11,6 @@
 #include <utility>
 
 namespace cles::core {
-
-/// The reply to the question for a publisher's epoch.
-class unconfirmed_updates::reply final : public detail::pending {
-  public:
-    reply(std::weak_ptr<unconfirmed_updates> owner, std::string publisher, std::string challenge)
-        : owner_(std::move(owner)), publisher_(std::move(publisher)), challenge_(std::move(challenge)) {}
-
-    verdict offer(std::string_view json) override {
-        const std::unique_ptr<reply> self{this};
-        if (const auto owner = owner_.lock()) {
-            const auto member = member_of(owner->node_, publisher_);
-            owner->on_answer(publisher_, read_confirmed_epoch(json, member, challenge_, *owner->node_.security));
-        }
-        return verdict::completed;
-    }
-    void fail(boost::system::error_code, std::string_view) override {
-        const std::unique_ptr<reply> self{this};
-        if (const auto owner = owner_.lock()) {
-            owner->on_answer(publisher_, {});
-        }
-    }
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return false; }
-
-  private:
-    std::weak_ptr<unconfirmed_updates> owner_;
-    std::string publisher_;
-    std::string challenge_;
-};
 
 void unconfirmed_updates::hold(const protocol::request_line& update, time_point now) {
     const auto& line = update.text;
@@ -68,9 +40,17 @@ void unconfirmed_updates::ask(const std::string& publisher, time_point now) {
     }
     const auto challenge = node_.security->new_challenge();
     const auto noun = epoch_question(publisher, challenge);
+    auto then = [weak = weak_from_this(), publisher, challenge](const peer_answer& found) {
+        if (const auto self = weak.lock()) {
+            const auto member = member_of(self->node_, publisher);
+            self->on_answer(publisher,
+                            found.code ? std::nullopt
+                                       : read_confirmed_epoch(found.json, member, challenge, *self->node_.security));
+        }
+    };
     outbound_.send({.verb = verb::pull, .noun = noun, .id = node_.next_id++},
                    now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,
-                   detail::pending_ptr{new reply(weak_from_this(), publisher, challenge)});
+                   detail::pending_ptr{new peer_reply{std::move(then)}});
 }
 
 // Delivered in a turn of its own, since this may be inside the processing of a line.

@@ -44,7 +44,6 @@ class unconfirmed_updates final : public std::enable_shared_from_this<unconfirme
     [[nodiscard]] std::size_t size() const noexcept { return held_.size(); }
 
   private:
-    class reply;
     struct held_update {
         std::string publisher;
         std::uint32_t epoch = 0;

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/sharing/sharing_driver.hpp"
-
-#include "node/membership/discovery.hpp"
+#include "node/local_node.hpp"
 #include "node/membership/gossip.hpp"
 #include "node/routing/router.hpp"
 #include "node/routing/service_registry.hpp"
+#include "node/sharing/work_sharing.hpp"
 
 #include <memory>
-#include <string>
 #include <utility>
 
 namespace cles::core {
@@ -33,19 +31,9 @@ class sharing_driver final : private work_sharing::client, public work_sharing {
         return other.live && other.reachable() && (routes == nullptr || !routes->reach().is_beyond(other.name)) &&
                !host_.peer_channels().is_by_datagram(other.name);
     }
-    void push_slots(std::string_view node, std::uint64_t grant, std::string_view body, slots_reply then) override {
-        const auto adverbs = grant != 0 ? "grant=" + protocol::grant_text(grant) : std::string{};
-        const auto noun = std::string{node} + ":cles/slots";
-        auto operation = detail::pending_ptr{new peer_reply{
-            host_.weak_from_this(),
-            [then = std::move(then)](local_node&, const peer_answer& answer) { then(answer.json, answer.code); },
-            true}};
-        host_.peer_channels().send(node, {}, {.verb = verb::push, .noun = noun, .adverbs = adverbs, .body = body},
-                                   host_.now() + slot_grants::valid_for, std::move(operation), {});
-    }
-    std::uint64_t forward(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
-                          outbound::progress_function progress) override {
-        return host_.peer_channels().send(r.target(), {}, r, due, std::move(reply), std::move(progress));
+    std::uint64_t send(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
+                       outbound::progress_function progress) override {
+        return host_.peer_channels().send({.target = r.target()}, r, due, std::move(reply), std::move(progress));
     }
     void cancel(std::uint64_t ticket) override { host_.cancel(ticket); }
     std::uint32_t random() override { return host_.environment().random(); }

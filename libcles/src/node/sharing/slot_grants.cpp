@@ -7,11 +7,7 @@ namespace cles::core {
 
 std::uint64_t slot_grants::open(std::string_view to, std::uint64_t number, unsigned slots, unsigned reserved,
                                 time_point now) {
-    auto found = grants_.find(to);
-    if (found == grants_.end()) {
-        found = grants_.try_emplace(std::string{to}).first;
-    }
-    auto& given = found->second;
+    auto& given = grants_[std::string{to}];
     if (now >= given.expires) {
         given = {.number = number, .previous = given.number};
     }

@@ -5,6 +5,7 @@
 #include <cles/json_writer.hpp>
 
 #include "json/json_members.hpp"
+#include "node/membership/announcement.hpp"
 #include "node/routing/next_hop.hpp"
 #include "node/session/call.hpp"
 #include "node/session/reply_writer.hpp"
@@ -12,7 +13,6 @@
 #include "port/node_security.hpp"
 
 #include <algorithm>
-#include <limits>
 #include <utility>
 
 namespace cles::core {
@@ -29,10 +29,6 @@ void smooth(std::optional<microseconds>& average, microseconds sample) {
 microseconds elapsed(time_point since, time_point now) { return std::chrono::duration_cast<microseconds>(now - since); }
 
 std::string_view task_of(const movable_request& r) { return std::string_view{r.path}.substr(0, r.path.find('/')); }
-
-std::uint32_t bounded(std::uint64_t count) {
-    return static_cast<std::uint32_t>(std::min<std::uint64_t>(count, std::numeric_limits<std::uint32_t>::max()));
-}
 
 template <class Write>
 std::string object(Write write) {
@@ -149,7 +145,7 @@ std::string work_sharing::grant_another(std::string_view to) {
         return {};
     }
     auto& other = known_[std::string{to}];
-    if (const auto* first = most_loaded(now); first != nullptr && known_.find(*first)->second.waiting > other.waiting) {
+    if (const auto* first = most_loaded(now); first != nullptr && first->second.waiting > other.waiting) {
         return {};
     }
     const bool has_more = other.waiting != 0; // then it will use the slot at once
@@ -161,9 +157,9 @@ bool work_sharing::read(std::string_view body, std::size_t depth, slots_message&
     json_reader reader{body, depth};
     const bool valid = read_members(reader, [&](std::string_view key) {
         return key == "node"         ? reader.read(to.node)
-               : key == "free"       ? reader.read(to.free)
-               : key == "waiting"    ? reader.read(to.waiting)
-               : key == "service_us" ? reader.read(to.service_us)
+               : key == "free"       ? read_count(reader, to.free)
+               : key == "waiting"    ? read_count(reader, to.waiting)
+               : key == "service_us" ? read_count(reader, to.service_us)
                                      : reader.skip();
     });
     return valid && !to.node.empty();
@@ -200,15 +196,15 @@ void work_sharing::serve_slots(reply_writer& replies, const protocol::request_li
     auto& other = known_[std::string{said.node}];
     other.silent_until = time_point::min();
     if (r.grant == 0) {
-        other.waiting = bounded(said.waiting);
+        other.waiting = said.waiting;
         other.heard = now;
         replies.done(reply_target{r}, {});
         balance(now);
         return;
     }
     ++node_.counts.grants_received;
-    auto& held = hold(said.node, r.grant, bounded(said.free), now);
-    other.service_time = microseconds{bounded(said.service_us)};
+    auto& held = hold(said.node, r.grant, said.free, now);
+    other.service_time = microseconds{said.service_us};
     const auto taken = forward_jobs(std::string{said.node}, held, now);
     const bool may_have_more = taken != 0 && held.left == 0;
     const auto waiting = may_have_more ? jobs_.read_state().excess() : 0;
@@ -276,12 +272,12 @@ class work_sharing::forwarding final : public job_taker {
         const auto adverbs = r.adverbs + " grant=" + protocol::grant_text(grant_.number);
         const auto ticket = ++by_.last_ticket_;
         const auto request =
-            by_.out_.forward({.verb = verb::delegate,
-                              .noun = noun,
-                              .carried = job->wanted().carried(),
-                              .adverbs = adverbs,
-                              .body = body},
-                             job->due(), detail::pending_ptr{new moved_reply(by_, ticket)}, progress_to(job));
+            by_.out_.send({.verb = verb::delegate,
+                           .noun = noun,
+                           .carried = job->wanted().carried(),
+                           .adverbs = adverbs,
+                           .body = body},
+                          job->due(), detail::pending_ptr{new moved_reply(by_, ticket)}, progress_to(job));
         job->leave_to_others();
         by_.moved_.emplace(ticket, moved_job{.job = std::move(job),
                                              .ended = std::move(ended),
@@ -500,22 +496,23 @@ void work_sharing::look_at_loads(time_point now) {
     }
     look_at_ = now + look_every;
     refresh_neighbours();
-    for (const auto& other : neighbours_) {
-        if (other.load.queued != 0) {
-            auto& about = known_[std::string{other.name}];
-            about.waiting = about.heard < other.seen && now >= about.silent_until ? other.load.queued : about.waiting;
+    for (const auto* const other : neighbours_) {
+        if (other->load.queued != 0) {
+            auto& about = known_[other->name];
+            const auto* const run = node_.peers.owner(other->name);
+            const bool is_newer = run != nullptr && about.heard < run->last_seen;
+            about.waiting = is_newer && now >= about.silent_until ? other->load.queued : about.waiting;
         }
     }
 }
 
 // The node with the most jobs, except those whose slots are reserved already; null if there is none.
-const std::string* work_sharing::most_loaded(time_point now) const {
-    const std::string* most = nullptr;
-    std::uint32_t waiting = 0;
-    for (const auto& [name, other] : known_) {
-        if (other.waiting > waiting && granted_.reserved_for(name, now) == 0) {
-            most = &name;
-            waiting = other.waiting;
+work_sharing::acquaintances::value_type* work_sharing::most_loaded(time_point now) {
+    acquaintances::value_type* most = nullptr;
+    for (auto& one : known_) {
+        const auto& [name, other] = one;
+        if (other.waiting > (most != nullptr ? most->second.waiting : 0) && granted_.reserved_for(name, now) == 0) {
+            most = &one;
         }
     }
     return most;
@@ -524,15 +521,15 @@ const std::string* work_sharing::most_loaded(time_point now) const {
 // The most loaded ones first, each for the jobs that it may have.
 void work_sharing::grant_slots(unsigned slots, const shareable_queue::state& own, time_point now) {
     slots = std::min(slots, slot_grants::max_slots);
-    for (const std::string* to = nullptr; slots != 0 && (to = most_loaded(now)) != nullptr;) {
-        auto& other = known_.find(*to)->second;
-        if (find_neighbour(*to) == nullptr) {
+    for (acquaintances::value_type* to = nullptr; slots != 0 && (to = most_loaded(now)) != nullptr;) {
+        auto& [node, other] = *to;
+        if (find_neighbour(node) == nullptr) {
             other.waiting = 0;
             continue;
         }
         const auto given = std::min<unsigned>(slots, other.waiting);
         slots -= given;
-        push({.node = *to, .grant = open_grant(*to, given, given, now), .slots = given, .at = now},
+        push({.node = node, .grant = open_grant(node, given, given, now), .slots = given, .at = now},
              object([&](json_writer& w) {
                  write_member(w, "node", std::string_view{node_.name});
                  write_member(w, "free", std::uint64_t{given});
@@ -555,61 +552,67 @@ void work_sharing::tell(const shareable_queue::state& own, time_point now) {
     }
     tell_at_ = now + tell_every;
     refresh_neighbours();
-    std::erase_if(neighbours_, [&](const neighbour& other) {
-        const auto found = known_.find(other.name);
+    std::erase_if(neighbours_, [&](const known_node* other) {
+        const auto found = known_.find(other->name);
         const bool useless = found != known_.end() &&
                              (now < found->second.silent_until ||
                               (now < found->second.unsuitable_until && found->second.unsuitable == own.movable_queued));
-        return useless || other.load.workers == 0;
+        return useless || other->load.workers == 0;
     });
     if (neighbours_.empty()) {
         return;
     }
     std::rotate(neighbours_.begin(),
                 neighbours_.begin() + static_cast<std::ptrdiff_t>(draws_.below(neighbours_.size())), neighbours_.end());
-    std::stable_partition(neighbours_.begin(), neighbours_.end(), [](const neighbour& other) {
-        return other.load.queued + other.load.running < other.load.workers;
+    std::stable_partition(neighbours_.begin(), neighbours_.end(), [](const known_node* other) {
+        return other->load.queued + other->load.running < other->load.workers;
     });
     const auto body = object([&](json_writer& w) {
         write_member(w, "node", std::string_view{node_.name});
         write_member(w, "waiting", std::uint64_t{own.excess()});
     });
     for (std::size_t i = 0; i < std::min(told_at_once, neighbours_.size()); ++i) {
-        push({.node = std::string{neighbours_[i].name}, .at = now}, body);
+        push({.node = neighbours_[i]->name, .at = now}, body);
     }
 }
 
 void work_sharing::push(const sent_slots& what, const std::string& body) {
-    auto then = [weak = std::weak_ptr{alive_}, what](std::string_view json, boost::system::error_code why) {
+    const auto noun = what.node + ":cles/slots";
+    const auto adverbs = what.grant != 0 ? "grant=" + protocol::grant_text(what.grant) : std::string{};
+    auto then = [weak = std::weak_ptr{alive_}, what](const peer_answer& found) {
         if (const auto self = weak.lock()) {
-            (*self)->on_reply(what, json, why);
+            (*self)->on_reply(what, found);
         }
     };
-    out_.push_slots(what.node, what.grant, body, std::move(then));
+    out_.send({.verb = verb::push, .noun = noun, .adverbs = adverbs, .body = body},
+              node_.time.now() + slot_grants::valid_for, detail::pending_ptr{new peer_reply{std::move(then), true}},
+              {});
 }
 
-void work_sharing::on_reply(const sent_slots& what, std::string_view json, boost::system::error_code why) {
+void work_sharing::on_reply(const sent_slots& what, const peer_answer& found) {
     const auto now = node_.time.now();
     auto& other = known_[what.node];
-    std::uint64_t taken = 0;
-    std::uint64_t waiting = 0;
-    if (!json.empty()) {
+    std::uint32_t taken = 0;
+    std::uint32_t waiting = 0;
+    if (!found.json.empty()) {
         smooth(other.trip, elapsed(what.at, now));
-        json_reader reader{json, node_.bounds.depth};
+        json_reader reader{found.json, node_.bounds.depth};
         read_members(reader, [&](std::string_view key) {
-            return key == "taken" ? reader.read(taken) : key == "waiting" ? reader.read(waiting) : reader.skip();
+            return key == "taken"     ? read_count(reader, taken)
+                   : key == "waiting" ? read_count(reader, waiting)
+                                      : reader.skip();
         });
-    } else if (why == errc::deadline) {
+    } else if (found.code == errc::deadline) {
         other.trip = slot_grants::valid_for; // at least: a grant would arrive too late
-    } else if (why == errc::no_task) {
+    } else if (found.code == errc::no_task) {
         other.silent_until = now + not_shared_for;
     }
     if (what.grant == 0) {
         return;
     }
-    granted_.unreserve(what.node, what.grant, what.slots - std::min(what.slots, bounded(taken)));
+    granted_.unreserve(what.node, what.grant, what.slots - std::min(what.slots, taken));
     // Those that it does not give are not for this node, or not worth a transfer: until it reports jobs again.
-    other.waiting = taken == 0 ? 0 : bounded(waiting);
+    other.waiting = taken == 0 ? 0 : waiting;
     other.heard = now;
     balance(now);
 }
@@ -626,7 +629,7 @@ void work_sharing::refresh_neighbours() {
     if (const auto* const others = out_.registry()) {
         for (const auto& [name, other] : others->nodes()) {
             if (out_.is_neighbour(*other)) {
-                neighbours_.push_back({name, other->load, node_.peers.last_seen(name)});
+                neighbours_.push_back(other.get());
             }
         }
     }

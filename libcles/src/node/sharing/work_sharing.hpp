@@ -7,6 +7,7 @@
 
 #include "node/base/backoff.hpp"
 #include "node/base/deadlines.hpp"
+#include "node/base/peer_reply.hpp"
 #include "node/node_state.hpp"
 #include "node/routing/service_registry.hpp"
 #include "node/routing/subrequest.hpp"
@@ -14,8 +15,6 @@
 #include "node/sharing/movable_request.hpp"
 #include "node/sharing/slot_grants.hpp"
 #include "protocol/request_line.hpp"
-
-#include <boost/system/error_code.hpp>
 
 #include <chrono>
 #include <cstddef>
@@ -29,12 +28,12 @@
 
 namespace cles::core {
 
+class local_node;
+
 /// Moves jobs between the queues of nodes (docs/protocol.md, "Work sharing"): with free workers, it grants slots to
 /// nodes that have jobs waiting; with jobs waiting, it tells others, and forwards jobs on the grants that it gets.
 class work_sharing : public job_sharing, public request_sharing, private deadline {
   public:
-    /// The reply to `PUSH cles/slots`: JSON, or why there is none.
-    using slots_reply = std::function<void(std::string_view json, boost::system::error_code why)>;
     /// What it needs from the node.
     class client {
       public:
@@ -46,13 +45,10 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
         [[nodiscard]] virtual const service_registry* registry() const = 0;
         /// Whether that node is live, and reached by a stream, without a third node.
         [[nodiscard]] virtual bool is_neighbour(const known_node& other) const = 0;
-        /// Sends `PUSH cles/slots`. `then` is not called inside this call. \param grant 0: none
-        virtual void push_slots(std::string_view node, std::uint64_t grant, std::string_view body,
-                                slots_reply then) = 0;
-        /// Sends a request, whose outcome is reported to `reply`, never inside this call. Returns a ticket for
-        /// `cancel`.
-        virtual std::uint64_t forward(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
-                                      outbound::progress_function progress) = 0;
+        /// Sends a request to the node that its noun names. The outcome is reported to `reply`, never inside this
+        /// call. Returns a ticket for `cancel`.
+        virtual std::uint64_t send(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
+                                   outbound::progress_function progress) = 0;
         /// Cancels it; the outcome may be reported inside this call.
         virtual void cancel(std::uint64_t ticket) = 0;
         virtual std::uint32_t random() = 0;
@@ -111,7 +107,7 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
         std::uint32_t waiting = 0;                        // jobs there that may be moved
         time_point heard = time_point::min();             // when it last said so
         std::chrono::microseconds service_time{0};        // of a job there; 0: not known
-        std::optional<std::chrono::microseconds> trip;    // how long `push_slots` takes there and back
+        std::optional<std::chrono::microseconds> trip;    // how long `PUSH cles/slots` takes there and back
         std::optional<std::chrono::microseconds> surplus; // what moved jobs take longer than usual there
         time_point surplus_until{};                       // it counts
         time_point silent_until = time_point::min();      // it does not share its work, and is sent nothing
@@ -123,18 +119,13 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
 
         [[nodiscard]] std::chrono::microseconds transfer(time_point now) const;
     };
-    /// Another node that is reached without a third one.
-    struct neighbour {
-        std::string_view name;
-        node_load load;
-        time_point seen{}; // when it last reported its load
-    };
+    using acquaintances = std::map<std::string, acquaintance, std::less<>>;
     /// The body of `PUSH cles/slots`.
     struct slots_message {
         std::string_view node;
-        std::uint64_t free = 0;
-        std::uint64_t waiting = 0;
-        std::uint64_t service_us = 0;
+        std::uint32_t free = 0;
+        std::uint32_t waiting = 0;
+        std::uint32_t service_us = 0;
     };
     /// A `PUSH cles/slots` that this node has sent.
     struct sent_slots {
@@ -165,12 +156,12 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     void balance(time_point now);
     void grant_slots(unsigned slots, const shareable_queue::state& own, time_point now);
     std::uint64_t open_grant(std::string_view to, unsigned slots, unsigned reserved, time_point now);
-    [[nodiscard]] const std::string* most_loaded(time_point now) const;
+    [[nodiscard]] acquaintances::value_type* most_loaded(time_point now);
     void look_at_loads(time_point now);
     void tell(const shareable_queue::state& own, time_point now);
     void arm_timer(const shareable_queue::state& own, time_point now);
     void push(const sent_slots& what, const std::string& body);
-    void on_reply(const sent_slots& what, std::string_view json, boost::system::error_code why);
+    void on_reply(const sent_slots& what, const peer_answer& found);
     unsigned forward_jobs(const std::string& node, held_grant& by, time_point now);
     void use_held_grants(time_point now);
     void hold_another(std::uint64_t ticket, std::uint64_t grant);
@@ -188,15 +179,18 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     shareable_queue& jobs_;
     jitter draws_;
     slot_grants granted_;
-    std::map<std::string, acquaintance, std::less<>> known_;
+    acquaintances known_;
     std::map<std::string, held_grant, std::less<>> held_;
     std::map<std::uint64_t, moved_job> moved_; // by ticket
     std::uint64_t last_ticket_ = 0;
     time_point tell_at_ = time_point::min();                                             // not before
     time_point look_at_ = time_point::min();                                             // not before
-    std::vector<neighbour> neighbours_;                                                  // scratch
+    std::vector<const known_node*> neighbours_;                                          // scratch
     bool has_logged_why_ = false;                                                        // jobs stay here
     const std::shared_ptr<work_sharing*> alive_ = std::make_shared<work_sharing*>(this); // for late replies
 };
+
+/// Lets a node share the jobs of a queue; see `cles::share_jobs`.
+[[nodiscard]] std::unique_ptr<job_sharing> make_sharing(local_node& host, shareable_queue& jobs);
 
 } // namespace cles::core

@@ -2,7 +2,7 @@
 #include <cles/error.hpp>
 
 #include "node/base/completion_queue.hpp"
-#include "node/membership/discovery.hpp"
+#include "node/base/peer_reply.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -190,7 +190,7 @@ BOOST_FIXTURE_TEST_CASE(an_answer_is_told_at_once_and_what_is_thrown_leaves_the_
 }
 
 BOOST_AUTO_TEST_CASE(the_answer_to_a_probe_is_the_librarys_own) {
-    const cles::detail::pending_ptr probe{new cles::core::peer_reply{{}, {}}};
+    const cles::detail::pending_ptr probe{new cles::core::peer_reply{nullptr}};
     BOOST_TEST(!probe->calls_user());
 }
 

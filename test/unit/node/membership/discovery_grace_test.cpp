@@ -17,10 +17,10 @@ struct fixture {
         deadlines.expire(clock.now());
     }
 
-    int times_over = 0;
+    int changes = 0;
     cles::test::manual_clock clock;
     cles::core::deadline_queue deadlines;
-    cles::core::discovery_grace grace{deadlines, [this] { ++times_over; }};
+    cles::core::discovery_grace grace{deadlines, [this] { ++changes; }};
 };
 
 } // namespace
@@ -37,10 +37,44 @@ BOOST_AUTO_TEST_CASE(lasts_300_ms_from_its_begin) {
     grace.begin(clock.now());
     pass(299ms);
     BOOST_TEST(!grace.over());
-    BOOST_TEST(times_over == 0);
+    BOOST_TEST(changes == 0);
     pass(1ms);
     BOOST_TEST(grace.over());
-    BOOST_TEST(times_over == 1);
+    BOOST_TEST(changes == 1);
+}
+
+BOOST_AUTO_TEST_CASE(then_it_waits_for_the_seeds) {
+    grace.begin(clock.now(), true);
+    pass(300ms);
+    BOOST_TEST(!grace.over());
+    BOOST_TEST(changes == 1);
+    pass(2s);
+    grace.on_seeds_heard();
+    BOOST_TEST(grace.over());
+    BOOST_TEST(changes == 2);
+    pass(10s);
+    BOOST_TEST(changes == 2);
+}
+
+BOOST_AUTO_TEST_CASE(seeds_that_are_heard_early_do_not_shorten_it) {
+    grace.begin(clock.now(), true);
+    pass(100ms);
+    grace.on_seeds_heard();
+    pass(199ms);
+    BOOST_TEST(!grace.over());
+    pass(1ms);
+    BOOST_TEST(grace.over());
+    BOOST_TEST(changes == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_silent_seed_is_waited_for_four_seconds_in_all) {
+    grace.begin(clock.now(), true);
+    pass(300ms);
+    pass(3699ms);
+    BOOST_TEST(!grace.over());
+    pass(1ms);
+    BOOST_TEST(grace.over());
+    BOOST_TEST(changes == 2);
 }
 
 BOOST_AUTO_TEST_CASE(stop_ends_it_without_notification) {
@@ -49,7 +83,7 @@ BOOST_AUTO_TEST_CASE(stop_ends_it_without_notification) {
     grace.stop();
     BOOST_TEST(grace.over());
     pass(1s);
-    BOOST_TEST(times_over == 0);
+    BOOST_TEST(changes == 0);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

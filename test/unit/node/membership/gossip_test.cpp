@@ -27,6 +27,7 @@ struct fixture : cles::core::gossip::client, cles::core::membership::watcher {
     }
     void push(const destination& at, std::string_view table) override { pushed[std::string{at.url}] = table; }
     [[nodiscard]] bool forwards_for(std::string_view) const override { return true; }
+    void on_seeds_heard() override { ++times_heard; }
     void release(const destination& at) override { released.insert(std::string{at.url}); }
     void on_peer(std::string_view node, cles::core::membership::change what, std::string_view where) override {
         if (what == cles::core::membership::change::gone) {
@@ -98,6 +99,7 @@ struct fixture : cles::core::gossip::client, cles::core::membership::watcher {
     std::map<std::string, std::string> pushed;
     std::set<std::string> released;
     std::map<int, int> asked_count;
+    int times_heard = 0;
     int seq = 1;
     cles::test::manual_clock clock;
     cles::core::deadline_queue deadlines;
@@ -483,6 +485,42 @@ BOOST_AUTO_TEST_CASE(a_number_that_a_neighbour_asks_for_is_asked_for_elsewhere) 
     BOOST_TEST(
         pushed[url_of(2)] ==
         R"({"node":"car5","epoch":"00000005","peers":[],"routes":{"00000003":[0]},"wanted":{"00000003":[1,15]}})");
+}
+
+BOOST_AUTO_TEST_CASE(seeds_are_heard_when_each_has_answered_or_refused) {
+    begin({url_of(1), url_of(2)});
+    auto first = take_asks();
+    BOOST_REQUIRE(first.size() == 2U);
+    gossip.on_answer(first[0].ticket, answer(1, {1}), clock.now());
+    BOOST_TEST(times_heard == 0);
+    gossip.on_failure(first[1].ticket, clock.now());
+    BOOST_TEST(times_heard == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_seed_without_a_reply_in_time_has_not_been_heard) {
+    begin({url_of(1)});
+    const auto first = take_asks();
+    BOOST_REQUIRE(first.size() == 1U);
+    pass(2s);
+    gossip.on_failure(first[0].ticket, clock.now());
+    BOOST_TEST(times_heard == 0);
+    auto next = take_asks();
+    for (auto waited = 0ms; next.empty() && waited < 5s; waited += 50ms) {
+        next = take_asks_within(50ms);
+    }
+    BOOST_REQUIRE(!next.empty());
+    gossip.on_answer(next[0].ticket, answer(1, {1}), clock.now());
+    BOOST_TEST(times_heard == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_seed_is_heard_with_the_last_page_of_its_table) {
+    begin({url_of(1)});
+    gossip.on_answer(take_asks().at(0).ticket, answer(1, {1}, R"(,"more":true)"), clock.now());
+    BOOST_TEST(times_heard == 0);
+    const auto next = take_asks_within(50ms);
+    BOOST_REQUIRE(!next.empty());
+    gossip.on_answer(next[0].ticket, answer(1, {2}), clock.now());
+    BOOST_TEST(times_heard == 1);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -462,9 +462,9 @@ BOOST_AUTO_TEST_CASE(another_incarnation_has_no_routes_yet) {
 
 BOOST_AUTO_TEST_CASE(a_node_to_which_no_link_can_be_opened_is_not_used) {
     reply("car2", {5, 1});
-    reach.on_unreachable("car2", now);
+    reach.lose("car2", now);
     BOOST_TEST(reach.next_hop_to("far", {}).empty());
-    reach.on_unreachable("nobody", now);
+    reach.lose("nobody", now);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -32,7 +32,9 @@ struct fixture {
         table.apply("far", run, by, {seq, hops}, usable());
     }
     std::string hop(std::string_view avoid = {}) {
-        return std::string{table.next_hop("far", usable(), [avoid](std::string_view by) { return by == avoid; })};
+        const auto* const found =
+            table.find_route("far", usable(), [avoid](std::string_view by) { return by == avoid; });
+        return found == nullptr ? std::string{} : found->by;
     }
     route_advert advert(std::string_view to = "asker", bool direct = false) {
         return table.advertise("far", epoch, direct, usable(), to);
@@ -46,7 +48,7 @@ BOOST_AUTO_TEST_CASE(the_shortest_route_is_used_and_advertised_one_link_longer) 
     offer("b", 7, 1);
     BOOST_TEST(hop() == "b");
     BOOST_TEST((advert() == route_advert{7, 2}));
-    BOOST_TEST(table.hops_to("far", usable()).value() == 2U);
+    BOOST_TEST(table.find_route("far", usable())->hops == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(of_equal_routes_the_newest_and_then_the_first_name_is_used) {
@@ -60,7 +62,7 @@ BOOST_AUTO_TEST_CASE(of_equal_routes_the_newest_and_then_the_first_name_is_used)
 BOOST_AUTO_TEST_CASE(without_an_offer_there_is_no_route) {
     BOOST_TEST(hop().empty());
     BOOST_TEST((advert() == route_advert{}));
-    BOOST_TEST(!table.hops_to("far", usable()));
+    BOOST_TEST((table.find_route("far", usable()) == nullptr));
 }
 
 // As long as what this node advertised last may have come back to it.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/membership/announcement.hpp"
 #include "node/publish/multicast_group.hpp"
-#include "node/secured/own_announcement.hpp"
+#include "node/secured/signed_announcer.hpp"
 #include "support/group_recorder.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"

@@ -151,7 +151,7 @@ BOOST_AUTO_TEST_CASE(each_publisher_is_thinned_separately) {
 BOOST_AUTO_TEST_CASE(waits_for_discovery) {
     routing->hold();
     BOOST_TEST(link.ask("BIND all:pose id=7").empty());
-    routing->release();
+    routing->release(false);
     BOOST_TEST(link.sent() == "id=7 ok");
 }
 

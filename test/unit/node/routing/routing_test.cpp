@@ -18,7 +18,7 @@ BOOST_AUTO_TEST_CASE(any_and_all_wait_for_the_discovery_grace) {
     routing->hold();
     BOOST_TEST(link.ask("PULL any:speed id=7").empty());
     BOOST_TEST(link.ask("PULL all:speed id=8").empty());
-    routing->release();
+    routing->release(false);
     BOOST_TEST(link.take() == "id=7 {\"value\":1}\nid=8 {\"results\":{\"car1\":{\"value\":1}},\"errors\":{}}\n");
 }
 
@@ -31,7 +31,7 @@ BOOST_AUTO_TEST_CASE(a_request_that_waited_starts_in_a_later_task) {
         link.ask("DELEGATE all:work id=1" + std::string{id});
     }
     waits_for_turn = true;
-    routing->release();
+    routing->release(false);
     BOOST_TEST(node.started.empty());
     BOOST_TEST(wakes != 0);
     have_turn();
@@ -48,11 +48,38 @@ BOOST_AUTO_TEST_CASE(a_node_discovered_in_the_grace_period_is_asked_after_it) {
     routing->hold();
     link.ask("PULL any:speed id=7");
     hear("car2");
-    routing->release();
+    routing->release(false);
     BOOST_TEST(link.take().empty()); // the request for the tasks of car2 is pending
     BOOST_TEST(ways.to("car2").text == "PULL car2:cles");
     ways.to("car2").answers(description("car2", task("PULL", "speed")));
     BOOST_TEST(ways.to("car2").text == "PULL car2:speed hops=7 via=car1");
+}
+
+BOOST_AUTO_TEST_CASE(what_nobody_serves_waits_on_for_the_seeds) {
+    node.on(verb::pull, "own", "1");
+    routing->hold();
+    link.ask("PULL any:speed id=7");
+    link.ask("PULL all:speed id=8");
+    routing->release(true);
+    node.pass(2s);
+    BOOST_TEST(link.take().empty());
+    BOOST_TEST(link.ask("PULL any:own id=9") == "id=9 {\"value\":1}\n");
+    BOOST_TEST(link.ask("PULL all:own id=10") == "id=10 {\"results\":{\"car1\":{\"value\":1}},\"errors\":{}}\n");
+    hear("car2");
+    routing->release(false);
+    ways.to("car2").answers(description("car2", task("PULL", "speed")));
+    BOOST_TEST(ways.to("car2").text == "PULL car2:speed hops=7 via=car1");
+    BOOST_TEST(ways.count_open() == 2U);
+}
+
+BOOST_AUTO_TEST_CASE(what_nobody_serves_fails_when_the_seeds_have_been_heard) {
+    routing->hold();
+    link.ask("PULL any:speed id=7");
+    link.ask("PULL all:speed id=8");
+    routing->release(true);
+    BOOST_TEST(link.take().empty());
+    routing->release(false);
+    BOOST_TEST(link.sent() == "id=7 no_target, id=8 no_target");
 }
 
 BOOST_AUTO_TEST_CASE(all_waits_until_the_tasks_of_each_node_are_known) {
@@ -81,7 +108,7 @@ BOOST_AUTO_TEST_CASE(a_waiting_request_ends_with_its_deadline_and_its_link) {
     node.pass(100ms);
     BOOST_TEST(link.sent() == "id=7 deadline");
     link.reset();
-    routing->release();
+    routing->release(false);
     BOOST_TEST(link.take().empty());
     BOOST_TEST(node.counts().handlers_running == 0U);
 }

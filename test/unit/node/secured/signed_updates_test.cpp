@@ -2,7 +2,6 @@
 #include <cles/error.hpp>
 
 #include "node/publish/multicast_group.hpp"
-#include "node/secured/signed_updates.hpp"
 #include "support/group_recorder.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"

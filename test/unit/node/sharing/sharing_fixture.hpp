@@ -122,20 +122,8 @@ struct sharing_fixture : routing_fixture, private core::work_sharing::client {
 
     [[nodiscard]] const core::service_registry* registry() const override { return &routing->registry(); }
     [[nodiscard]] bool is_neighbour(const core::known_node& other) const override { return !far.contains(other.name); }
-    void push_slots(std::string_view name, std::uint64_t grant, std::string_view body,
-                    core::work_sharing::slots_reply then) override {
-        const auto noun = std::string{name} + ":cles/slots";
-        const auto adverbs = grant != 0 ? "grant=" + protocol::grant_text(grant) : std::string{};
-        ways.send({.verb = verb::push, .noun = noun, .adverbs = adverbs, .body = body},
-                  node.clock.now() + core::slot_grants::valid_for,
-                  detail::pending_ptr{new core::subrequest([then = std::move(then)](std::string_view json,
-                                                                                    core::subrequest_failure* why) {
-                      then(json, why != nullptr ? make_error_code(why->reported.code) : boost::system::error_code{});
-                  })},
-                  {}, {});
-    }
-    std::uint64_t forward(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
-                          core::outbound::progress_function progress) override {
+    std::uint64_t send(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
+                       core::outbound::progress_function progress) override {
         return ways.send(r, due, std::move(reply), std::move(progress), {});
     }
     void cancel(std::uint64_t ticket) override { ways.cancel(ticket); }
