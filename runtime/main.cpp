@@ -9,8 +9,8 @@
 #include "daemon/command_line.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/daemon_log.hpp"
-#include "daemon/daemon_security.hpp"
 #include "daemon/service_manager.hpp"
+#include "daemon/service_parts.hpp"
 #include "isolation/plugin_process_main.hpp"
 #include "plugins/plugin_trial.hpp"
 

@@ -3,11 +3,11 @@
 #include <cles/error.hpp>
 
 #include "client/member_key.hpp"
-#include "drive.hpp"
 #include "options/keys_option.hpp"
 #include "output/errors.hpp"
-#include "simulate_command.hpp"
-#include "vehicle_node.hpp"
+#include "platoon/drive/drive.hpp"
+#include "platoon/drive/vehicle_node.hpp"
+#include "platoon/simulate_command.hpp"
 
 #include <CLI/CLI.hpp>
 

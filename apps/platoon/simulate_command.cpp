@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "simulate_command.hpp"
+#include "platoon/simulate_command.hpp"
 
 #include <cles/convert.hpp>
 
-#include "wilson.hpp"
+#include "platoon/simulation/wilson.hpp"
 
 #include <boost/describe/enum_to_string.hpp>
 

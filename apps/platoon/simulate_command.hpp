@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "recording.hpp"
-#include "simulation.hpp"
+#include "platoon/drive/recording.hpp"
+#include "platoon/simulation/simulation.hpp"
 
 #include <string>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "simulate_command.hpp"
+#include "platoon/simulate_command.hpp"
 
 #include <algorithm>
 #include <array>

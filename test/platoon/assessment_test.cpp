@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "platoon/assessment.hpp"
+#include "platoon/simulation/assessment.hpp"
 
 #include <boost/test/unit_test.hpp>
 

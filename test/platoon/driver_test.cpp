@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "platoon/driver.hpp"
+#include "platoon/driver/driver.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "platoon/impairment.hpp"
+#include "platoon/simulation/impairment.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "output/errors.hpp"
-#include "platoon/laboratory_fleet.hpp"
+#include "platoon/drive/laboratory_fleet.hpp"
 
 #ifdef CLES_SECURITY
 #include <cles/security/access.hpp>

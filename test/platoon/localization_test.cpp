@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/convert.hpp>
 
-#include "platoon/localization.hpp"
+#include "platoon/driver/localization.hpp"
 
 #include <boost/test/unit_test.hpp>
 

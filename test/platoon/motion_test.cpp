@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "platoon/manoeuvre.hpp"
-#include "platoon/motion.hpp"
+#include "platoon/driver/manoeuvre.hpp"
+#include "platoon/driver/motion.hpp"
 
 #include <boost/test/unit_test.hpp>
 

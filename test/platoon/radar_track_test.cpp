@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "platoon/radar_track.hpp"
+#include "platoon/driver/radar_track.hpp"
 
 #include <boost/test/unit_test.hpp>
 

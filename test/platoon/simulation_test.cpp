@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "platoon/simulation.hpp"
+#include "platoon/simulation/simulation.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "platoon/track.hpp"
+#include "platoon/driver/track.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "platoon/wilson.hpp"
+#include "platoon/simulation/wilson.hpp"
 
 #include <boost/test/unit_test.hpp>
 

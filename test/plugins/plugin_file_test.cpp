@@ -158,7 +158,7 @@ BOOST_AUTO_TEST_CASE(files_that_are_loaded_in_turn_are_not_confused) {
 BOOST_AUTO_TEST_CASE(the_same_file_is_not_loaded_twice_and_another_one_of_its_name_is) {
     boost::asio::io_context io;
     cles::service node{io, {.name = "node"}};
-    plugin_host host{{.node = "node", .folders = {folder}, .rules = rules}};
+    plugin_host host{{.node = "node", .rules = rules}};
     host.load("mine.so", "{}", node);
     BOOST_TEST(node.request("PULL self:number") == R"({"value":42})");
     fs::create_hard_link(file, folder / "same.so");
@@ -178,7 +178,7 @@ BOOST_AUTO_TEST_CASE(a_host_checks_the_pin) {
     const auto pin = cles::security::checked_file{file.string()}.sha256();
     boost::asio::io_context io;
     cles::service node{io, {.name = "node"}};
-    plugin_host host{{.node = "node", .folders = {folder}}};
+    plugin_host host{{.node = "node", .rules = {.folders = {folder}}}};
     const std::string other(64, '0');
     BOOST_TEST(refusal([&] { host.load("mine.so", "{}", node, other); }) ==
                "sha256: mine.so: the SHA-256 of " + file.string() + " is " + pin +

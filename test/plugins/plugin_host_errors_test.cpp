@@ -72,7 +72,7 @@ struct fixture {
 
     boost::asio::io_context io;
     cles::service node{io, {.name = "node"}};
-    plugin_host host{{.node = "node", .folders = {"/nowhere/at/all", MADE_PLUGINS}}};
+    plugin_host host{{.node = "node", .rules = {.folders = {"/nowhere/at/all", MADE_PLUGINS}}}};
 };
 
 std::string sound_path() { return std::string{MADE_PLUGINS} + "/sound.so"; }
@@ -97,25 +97,25 @@ BOOST_DATA_TEST_CASE(each_fault_is_reported_in_one_line_that_begins_with_the_pat
 }
 
 BOOST_AUTO_TEST_CASE(a_library_that_never_ends_loading_is_given_up) {
-    plugin_host hasty{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 200ms}};
+    plugin_host hasty{{.node = "node", .rules = {.folders = {MADE_PLUGINS}}, .trial = 200ms}};
     BOOST_CHECK_EXCEPTION(hasty.load("hangs_when_loaded.so", "{}", node), plugin_error, [](const plugin_error& e) {
         return std::string{e.what()} == "hangs_when_loaded.so: its initialization does not end";
     });
 }
 
 BOOST_AUTO_TEST_CASE(an_entry_point_that_never_returns_is_given_up) {
-    plugin_host hasty{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 200ms}};
+    plugin_host hasty{{.node = "node", .rules = {.folders = {MADE_PLUGINS}}, .trial = 200ms}};
     BOOST_CHECK_EXCEPTION(hasty.load("hangs_in_entry.so", "{}", node), plugin_error, [](const plugin_error& e) {
         return std::string{e.what()} == "hangs_in_entry.so: its entry point does not end";
     });
 }
 
 BOOST_AUTO_TEST_CASE(a_trial_ends_with_its_process_and_not_with_its_output) {
-    plugin_host hasty{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 3s}};
+    plugin_host hasty{{.node = "node", .rules = {.folders = {MADE_PLUGINS}}, .trial = 3s}};
     hasty.load("leaves_a_process.so", "{}", node);
     BOOST_TEST(hasty.plugins().size() == 1U);
     // Its output is discarded, and it continues.
-    plugin_host hastier{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 200ms}};
+    plugin_host hastier{{.node = "node", .rules = {.folders = {MADE_PLUGINS}}, .trial = 200ms}};
     BOOST_CHECK_EXCEPTION(
         hastier.load("closes_output_and_hangs.so", "{}", node), plugin_error, [](const plugin_error& e) {
             return std::string{e.what()} == "closes_output_and_hangs.so: its settings check does not end";
@@ -125,7 +125,7 @@ BOOST_AUTO_TEST_CASE(a_trial_ends_with_its_process_and_not_with_its_output) {
 BOOST_AUTO_TEST_CASE(the_setting_that_is_to_blame_is_named) {
     const auto blamed = [](const std::string& library, const std::string& config, std::chrono::milliseconds trial) {
         fixture f;
-        plugin_host other{{.node = "node", .folders = {MADE_PLUGINS}, .trial = trial}};
+        plugin_host other{{.node = "node", .rules = {.folders = {MADE_PLUGINS}}, .trial = trial}};
         try {
             other.load(library, config, f.node);
         } catch (const plugin_error& e) {
@@ -152,7 +152,7 @@ BOOST_AUTO_TEST_CASE(a_file_that_is_not_a_library_is_reported) {
     BOOST_TEST(load((folder / "empty.so").string()).find("it cannot be loaded: ") != std::string::npos);
     BOOST_TEST(load(folder.string()).find("it cannot be loaded: ") != std::string::npos);
     // Also without the trial.
-    plugin_host untried{{.node = "node", .folders = {}, .trial = 0ms}};
+    plugin_host untried{{.node = "node", .trial = 0ms}};
     BOOST_CHECK_EXCEPTION(untried.load(text, "{}", node), plugin_error, [](const plugin_error& e) {
         return std::string{e.what()}.find("it cannot be loaded: /") != std::string::npos;
     });
@@ -205,7 +205,7 @@ BOOST_AUTO_TEST_CASE(a_cpp_plugin_reports_what_its_function_threw) {
 
 BOOST_AUTO_TEST_CASE(a_refused_plugin_may_be_loaded_after_it_was_mended) {
     BOOST_TEST(refusal_of_sound("error") != "");
-    plugin_host other{{.node = "node", .folders = {MADE_PLUGINS}}};
+    plugin_host other{{.node = "node", .rules = {.folders = {MADE_PLUGINS}}}};
     other.load("sound.so", "{}", node);
     BOOST_TEST(ask("PULL self:number") == R"({"value":42})");
 }

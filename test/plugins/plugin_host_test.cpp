@@ -31,7 +31,7 @@ struct fixture {
     explicit fixture(const std::string& plugin = "sound.so", const std::string& config = "{}") {
         host.emplace(cles::runtime::plugin_host_options{
             .node = "node",
-            .folders = {MADE_PLUGINS},
+            .rules = {.folders = {MADE_PLUGINS}},
             .log =
                 [this](cles::log_level, std::string_view who, std::string_view text) {
                     const std::scoped_lock lock{mutex};

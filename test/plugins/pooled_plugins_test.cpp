@@ -34,7 +34,8 @@ struct fixture : pooled_node {
     }
 
     // Destroyed before the node and its pool.
-    cles::runtime::plugin_host host{{.node = "car1", .folders = {MADE_PLUGINS, PLUGINS}, .log = {}, .trial = 0ms}};
+    cles::runtime::plugin_host host{
+        {.node = "car1", .rules = {.folders = {MADE_PLUGINS, PLUGINS}}, .log = {}, .trial = 0ms}};
 };
 
 struct one_worker : fixture {

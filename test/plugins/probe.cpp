@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
     try {
         boost::asio::io_context io;
         cles::service node{io, {.name = "node"}};
-        cles::runtime::plugin_host host{{.node = "node", .folders = {}}};
+        cles::runtime::plugin_host host{{.node = "node"}};
         host.load(arguments.at(0), arguments.at(1), node);
         const auto& plugin = host.plugins().front();
         std::cout << plugin.name << ' ' << plugin.version << '\n';

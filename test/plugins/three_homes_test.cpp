@@ -44,7 +44,7 @@ BOOST_AUTO_TEST_CASE(an_application_a_test_and_a_plugin_answer_alike) {
 
     boost::asio::io_context other;
     cles::service daemon{other, {.name = "node"}};
-    cles::runtime::plugin_host host{{.node = "node", .folders = {}}};
+    cles::runtime::plugin_host host{{.node = "node"}};
     host.load(THREE_HOMES_PLUGIN, "{}", daemon);
 
     const auto here = answers_of(application);
@@ -57,7 +57,7 @@ BOOST_AUTO_TEST_CASE(an_application_a_test_and_a_plugin_answer_alike) {
 BOOST_AUTO_TEST_CASE(settings_for_a_plugin_without_any_are_reported) {
     boost::asio::io_context io;
     cles::service daemon{io, {.name = "node"}};
-    cles::runtime::plugin_host host{{.node = "node", .folders = {}}};
+    cles::runtime::plugin_host host{{.node = "node"}};
     BOOST_CHECK_EXCEPTION(
         host.load(THREE_HOMES_PLUGIN, R"({"km":7})", daemon), cles::runtime::plugin_error,
         [](const auto& e) { return std::string{e.what()}.ends_with(": it has no settings, but was given some"); });

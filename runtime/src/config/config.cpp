@@ -22,13 +22,17 @@ std::string to_valid_node_name(const std::string& host) {
     return name.empty() || name == "self" || name == "any" || name == "all" ? "node" : name;
 }
 
+[[noreturn]] void reject(const config& setup, const std::string& key, const std::string& why) {
+    throw config_error(setup.location_of(key), why);
+}
+
 void check_url(const config& setup, const std::string& key, const std::string& text) {
     const auto where = parse_url(text);
     if (where.scheme == "tls" && !setup.security.is_on()) {
-        throw config_error(setup.location_of(key), "'" + text + "' requires 'security'");
+        reject(setup, key, "'" + text + "' requires 'security'");
     }
     if (where.scheme == "tcp" && setup.security.is_on()) {
-        throw config_error(setup.location_of(key), "'" + text + "' is refused with 'security': use 'tls'");
+        reject(setup, key, "'" + text + "' is refused with 'security': use 'tls'");
     }
 }
 
@@ -36,32 +40,27 @@ void check_exposure(const config& setup, const std::string& key, const std::stri
     const auto where = parse_url(text);
     const auto* carrier = find_transport(where.scheme);
     if (!setup.insecure && !setup.security.is_on() && carrier != nullptr && carrier->is_exposed(where)) {
-        throw config_error(setup.location_of(key),
-                           "'" + text + "' can be reached from other hosts, which requires 'insecure: true'");
+        reject(setup, key, "'" + text + "' can be reached from other hosts, which requires 'insecure: true'");
     }
 }
 
 void check_federation(const config& setup) {
     if (!setup.insecure && !setup.security.is_on()) {
-        throw config_error(
-            setup.location_of("federation"),
-            "whoever reaches the NATS server can send requests, which requires 'security' or 'insecure: true'");
+        reject(setup, "federation",
+               "whoever reaches the NATS server can send requests, which requires 'security' or 'insecure: true'");
     }
     if (!setup.pool.empty() && setup.pool != setup.federation.pool) {
-        throw config_error(setup.location_of("federation.pool"),
-                           "'" + setup.federation.pool + "' is another pool than 'pool: " + setup.pool + "'");
+        reject(setup, "federation.pool",
+               "'" + setup.federation.pool + "' is another pool than 'pool: " + setup.pool + "'");
     }
 }
 
 } // namespace
 
 std::string config::location_of(const std::string& key) const {
-    for (auto known = key; !known.empty(); known.resize(std::min(known.find_last_of(".["), known.size()))) {
-        if (const auto found = origins.find(known); found != origins.end()) {
+    for (auto size = key.size(); size != 0 && size != std::string::npos; size = key.find_last_of(".[", size - 1)) {
+        if (const auto found = origins.find(key.substr(0, size)); found != origins.end()) {
             return found->second + ": " + key;
-        }
-        if (known.find_last_of(".[") == std::string::npos) {
-            break;
         }
     }
     return key;
@@ -106,18 +105,16 @@ void check(const config& setup) {
         const auto key = "seeds[" + std::to_string(i) + "]";
         check_url(setup, key, setup.seeds[i]);
         if (setup.security.is_on() && parse_url(setup.seeds[i]).scheme == "udp") { // they are sealed for a known node
-            throw config_error(setup.location_of(key),
-                               "'" + setup.seeds[i] + "' names no node, as 'udp' requires with 'security': use 'tls'");
+            reject(setup, key, "'" + setup.seeds[i] + "' names no node, as 'udp' requires with 'security': use 'tls'");
         }
     }
     constexpr std::size_t max_links = 16;
     if (setup.links.size() > max_links) {
-        throw config_error(setup.location_of("links"), std::to_string(setup.links.size()) + " names; at most 16 fit");
+        reject(setup, "links", std::to_string(setup.links.size()) + " names; at most 16 fit");
     }
     for (std::size_t i = 0; i < setup.links.size(); ++i) {
         if (setup.links[i] == setup.node) {
-            throw config_error(setup.location_of("links[" + std::to_string(i) + "]"),
-                               "'" + setup.node + "' is this node itself");
+            reject(setup, "links[" + std::to_string(i) + "]", "'" + setup.node + "' is this node itself");
         }
     }
     for (const auto& [name, url] : setup.peers) {
@@ -125,21 +122,19 @@ void check(const config& setup) {
     }
     if (setup.multicast.is_on() && setup.multicast.interface != "lo" && !setup.insecure &&
         !setup.security.is_on()) { // `auto` may choose any
-        throw config_error(setup.location_of("multicast"),
-                           "'" + setup.multicast.interface +
-                               "' can be reached from other hosts, which requires 'insecure: true'");
+        reject(setup, "multicast",
+               "'" + setup.multicast.interface + "' can be reached from other hosts, which requires 'insecure: true'");
     }
     if (setup.federation.is_on()) {
         check_federation(setup);
     }
     if (setup.peers.contains(setup.node)) {
-        throw config_error(setup.location_of("peers." + setup.node), "is this node's own name");
+        reject(setup, "peers." + setup.node, "is this node's own name");
     }
     std::set<std::string> paths;
     for (std::size_t i = 0; i < setup.plugins.size(); ++i) {
         if (!paths.insert(setup.plugins[i].path).second) {
-            throw config_error(setup.location_of("plugins[" + std::to_string(i) + "].path"),
-                               "'" + setup.plugins[i].path + "' is listed twice");
+            reject(setup, "plugins[" + std::to_string(i) + "].path", "'" + setup.plugins[i].path + "' is listed twice");
         }
     }
 }

@@ -29,7 +29,7 @@ constexpr std::size_t max_file_size = 1U << 20U;
 
 // -- values from YAML ----------------------------------------------------------------------------------------------
 
-// The following three make functions that return what they read. \param to converts text
+// The following four make functions that return what they read. \param to converts text
 template <class F>
 auto scalar(F to) {
     return [=](const yaml_value& from) { return from.as(to); };
@@ -45,6 +45,16 @@ auto list(F to) {
         } else {
             from.read_list([&](const yaml_value& item) { all.push_back(item.as(to)); });
         }
+        return all;
+    };
+}
+
+// A map whose keys are names of nodes.
+template <class F>
+auto by_name(F to) {
+    return [=](const yaml_value& from) {
+        std::map<std::string, std::string> all;
+        from.read_names([&](const std::string& name, const yaml_value& value) { all[name] = value.as(to); });
         return all;
     };
 }
@@ -95,12 +105,6 @@ void read_log(const yaml_value& from, log_config& into) {
         {{"level", part(into.level, scalar(to_log_level))}, {"format", part(into.format, scalar(to_log_format))}});
 }
 
-std::map<std::string, std::string> peers_of(const yaml_value& from) {
-    std::map<std::string, std::string> peers;
-    from.read_names([&](const std::string& name, const yaml_value& url) { peers[name] = url.as(to_url); });
-    return peers;
-}
-
 security_config security_of(const yaml_value& from) {
     const auto to_directory = [](const std::string& text) { return text == "off" ? std::string{} : text; };
     security_config read;
@@ -108,14 +112,8 @@ security_config security_of(const yaml_value& from) {
         read.keys = from.as(to_directory);
         return read;
     }
-    const auto read_users = [](const yaml_value& users) {
-        std::map<std::string, std::string> all;
-        users.read_names(
-            [&](const std::string& user, const yaml_value& member) { all[user] = member.as(to_node_name); });
-        return all;
-    };
-    from.read_map(
-        {{"keys", part(read.keys, scalar(to_directory))}, {"local_users", part(read.local_users, read_users)}});
+    from.read_map({{"keys", part(read.keys, scalar(to_directory))},
+                   {"local_users", part(read.local_users, by_name(to_node_name))}});
     if (!read.is_on()) {
         from.fail("has no 'keys', the directory of the node's key");
     }
@@ -368,7 +366,7 @@ const std::vector<setting>& settings() {
                                           value("multicast", &config::multicast, multicast_of),
                                           value("seeds", &config::seeds, list(to_url)),
                                           value("links", &config::links, list(to_node_name)),
-                                          value("peers", &config::peers, peers_of),
+                                          value("peers", &config::peers, by_name(to_url)),
                                           value("federation", &config::federation, federation_of),
                                           value("workers", &config::workers, count(1, max_workers)),
                                           value("queue", &config::queue, count(1, max_queue)),

@@ -6,8 +6,7 @@
 #include "config/config.hpp"
 #include "config/config_file.hpp"
 #include "config/config_values.hpp"
-#include "daemon/daemon_federation.hpp"
-#include "daemon/daemon_security.hpp"
+#include "daemon/service_parts.hpp"
 #include "jobs/current_trace.hpp"
 #include "jobs/pooled_registrar.hpp"
 #include "plugins/plugin_library.hpp"
@@ -64,7 +63,6 @@ pool_options pool_options_of(const config& setup, const daemon_log& log) {
 plugin_host_options host_options_of(const config& setup, const daemon_log& log) {
     plugin_host_options options{.node = setup.node};
     options.rules = plugin_rules_of(setup);
-    options.folders = options.rules.folders;
     options.trial = 0ms; // they were tried before threads were started
     options.log = [&log](log_level level, std::string_view plugin, std::string_view text) {
         const auto line = std::string{plugin} + ": " + std::string{text};
@@ -175,23 +173,12 @@ void daemon::load_plugin(std::size_t index) {
 }
 
 void daemon::load_isolated(std::size_t index, const std::string& path) {
-    const isolated_plugin_node node{
-        .executor = io_.get_executor(),
-        .add =
-            [this](registration task) {
-                pooled_registrar{service_, pool_}.add(std::move(task));
-            },
-        .remove = [this](cles::verb verb, std::string_view task) { service_.remove(verb, task); },
-        .publish = [this](std::string_view noun, const json_text& value) { service_.update(noun, value); },
-        .retire = [this](std::string_view task) { service_.retire_all(task); },
-        .log = host_options_of(setup_, log_).log};
-    const auto isolated =
-        std::make_shared<isolated_plugin>(node, load_message_of(setup_, setup_.plugins[index], path),
-                                          session_options{.program = "/proc/self/exe",
-                                                          .plugin = std::filesystem::path{path}.filename().string(),
-                                                          .lanes = setup_.lanes(),
-                                                          .grace = setup_.stuck_after,
-                                                          .max_line = 2 * setup_.limits.line + 65536});
+    const auto isolated = std::make_shared<isolated_plugin>(
+        service_, pool_, host_options_of(setup_, log_).log, load_message_of(setup_, setup_.plugins[index], path),
+        session_options{.plugin = std::filesystem::path{path}.filename().string(),
+                        .lanes = setup_.lanes(),
+                        .grace = setup_.stuck_after,
+                        .max_line = 2 * setup_.limits.line + 65536});
     isolated->start();
     isolated_.push_back({index, isolated});
 }
@@ -299,7 +286,11 @@ void daemon::finish() {
     }
     unfinished_work_ = !stopped.late.empty() || stopped.callbacks > 0;
     service_.stop();
-    close_pool();
+    if (!stopped_at_once_) {
+        // Here, and not in the destructor, to find out whether work is unfinished. Jobs that were told to stop at the
+        // end of the drain get a moment to do so.
+        unfinished_work_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0 || unfinished_work_;
+    }
     signals_.cancel();
     log_.info("stopped");
     // A job that does not end is still watched, and keeps the context running.
@@ -317,14 +308,6 @@ void daemon::end_isolated(milliseconds limit) {
         }
     }
     isolated_.clear();
-}
-
-// Closed here, and not in the destructor, to find out whether work is unfinished. Jobs that were told to stop at the
-// end of the drain get a moment to do so.
-void daemon::close_pool() {
-    if (!stopped_at_once_) {
-        unfinished_work_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0 || unfinished_work_;
-    }
 }
 
 // -- reload --------------------------------------------------------------------------------------------------------

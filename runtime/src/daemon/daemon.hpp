@@ -58,7 +58,6 @@ class daemon {
     void close(const drain_report& report);
     void finish();
     void end_isolated(std::chrono::milliseconds limit);
-    void close_pool();
     [[nodiscard]] std::chrono::milliseconds time_left() const;
     void reload();
 

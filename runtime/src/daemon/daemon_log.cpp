@@ -7,7 +7,6 @@
 #include <spdlog/sinks/ansicolor_sink.h>
 
 #include <array>
-#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/isolated_plugin.hpp"
 
+#include "jobs/pooled_registrar.hpp"
 #include "plugins/plugin_error.hpp"
 
 #include <algorithm>
@@ -25,9 +26,10 @@ constexpr std::size_t max_name = 100;
 
 } // namespace
 
-isolated_plugin::isolated_plugin(isolated_plugin_node node, load_message loading, session_options session)
-    : node_(std::move(node)), loading_(std::move(loading)), session_options_(std::move(session)), name_(loading_.path) {
-}
+isolated_plugin::isolated_plugin(service& host, job_pool& pool, plugin_log log, load_message loading,
+                                 session_options session)
+    : host_(host), pool_(pool), log_(std::move(log)), loading_(std::move(loading)),
+      session_options_(std::move(session)), name_(loading_.path) {}
 
 // -- jobs, on workers ----------------------------------------------------------------------------------------------
 
@@ -42,14 +44,14 @@ void isolated_plugin::run(const request& what, const responder& answer) {
 // Waits for a process that takes jobs. If there is none in time, answers, and returns null.
 std::shared_ptr<plugin_session> isolated_plugin::session_for(const responder& answer) {
     std::unique_lock lock{mutex_};
-    const auto decided = [this] { return unavailable_ || (current_ && current_->usable()); };
+    const auto decided = [this] { return !why_unavailable_.empty() || (current_ && current_->usable()); };
     if (!decided()) {
         if (!missing_since_) {
             missing_since_ = clock::now();
         }
         changed_.wait_for(lock, *missing_since_ + max_wait - clock::now(), decided);
     }
-    if (unavailable_) {
+    if (!why_unavailable_.empty()) {
         const auto why = why_unavailable_;
         lock.unlock();
         answer.fail(errc::unavailable, why);
@@ -104,7 +106,7 @@ void isolated_plugin::launch() {
     refused_.reset();
     start_failure_.clear();
     last_output_.clear();
-    starting_ = std::make_shared<plugin_session>(node_.executor, name_, session_options_, events_of(run_));
+    starting_ = std::make_shared<plugin_session>(host_.get_executor(), name_, session_options_, events_of(run_));
     loading_.require_paths = first_start_; // a device may be unplugged while it runs
     starting_->load(loading_);
 }
@@ -146,8 +148,9 @@ void isolated_plugin::on_started(const started_message& what) {
         }
         starting_->set_name(name_);
         offer(what.tasks);
-    } catch (const error& e) {
-        fail_to_start(e.what());
+    } catch (const error& e) { // it runs, but cannot be used
+        start_failure_ = e.what();
+        starting_->kill(start_failure_);
         return;
     }
     const auto tasks = std::to_string(offered_.size()) + (offered_.size() == 1 ? " task" : " tasks");
@@ -160,14 +163,8 @@ void isolated_plugin::on_started(const started_message& what) {
     const std::scoped_lock lock{mutex_};
     current_ = std::move(starting_);
     missing_since_.reset();
-    unavailable_ = false;
+    why_unavailable_.clear();
     changed_.notify_all();
-}
-
-// It runs, but cannot be used.
-void isolated_plugin::fail_to_start(const std::string& why) {
-    start_failure_ = why;
-    starting_->kill(why);
 }
 
 void isolated_plugin::on_ended(const process_end& how) {
@@ -191,7 +188,13 @@ void isolated_plugin::on_ended(const process_end& how) {
         return;
     }
     ++ended_;
-    restart_or_withdraw(why);
+    if (policy_.ended(clock::now()) == restart_policy::decision::restart) {
+        log(log_level::error, why + ". Restarting.");
+        relaunch();
+    } else {
+        log(log_level::error, "third end within 60 s; the last: " + why + ". Its tasks are withdrawn until SIGHUP.");
+        withdraw();
+    }
 }
 
 std::string isolated_plugin::describe(const process_end& how) const {
@@ -203,19 +206,9 @@ std::string isolated_plugin::describe(const process_end& how) const {
            (last_output_.empty() ? "" : "; last output: '" + last_output_ + "'");
 }
 
-void isolated_plugin::restart_or_withdraw(const std::string& why) {
-    if (policy_.ended(clock::now()) == restart_policy::decision::restart) {
-        log(log_level::error, why + ". Restarting.");
-        relaunch();
-    } else {
-        log(log_level::error, "third end within 60 s; the last: " + why + ". Its tasks are withdrawn until SIGHUP.");
-        withdraw();
-    }
-}
-
 void isolated_plugin::restart_after(std::chrono::milliseconds delay, const std::string& why) {
     log(log_level::error, why + ". Restarting in " + std::to_string(delay.count()) + " ms.");
-    start_timer_.emplace(node_.executor, delay);
+    start_timer_.emplace(host_.get_executor(), delay);
     start_timer_->async_wait([weak = weak_from_this()](boost::system::error_code cancelled) {
         if (const auto self = weak.lock(); self && !cancelled && !self->stopping_) {
             self->relaunch();
@@ -232,7 +225,7 @@ void isolated_plugin::relaunch() {
         restart_after(policy_.delay(clock::now()), std::string{"its process could not be started: "} + e.what());
         return;
     }
-    start_timer_.emplace(node_.executor, max_start_time);
+    start_timer_.emplace(host_.get_executor(), max_start_time);
     start_timer_->async_wait([weak = std::weak_ptr{starting_}](boost::system::error_code cancelled) {
         if (const auto session = weak.lock(); session && !cancelled) {
             session->kill("it did not start in time");
@@ -260,8 +253,7 @@ void isolated_plugin::offer(const std::vector<offered_task>& tasks) {
         if (std::find(tasks.begin(), tasks.end(), old) != tasks.end()) {
             return false;
         }
-        node_.remove(*verb_from(old.verb), old.task);
-        node_.retire(old.task);
+        remove(old);
         return true;
     });
     for (const auto& each : tasks) {
@@ -272,31 +264,28 @@ void isolated_plugin::offer(const std::vector<offered_task>& tasks) {
         if (std::find(offered_.begin(), offered_.end(), each) != offered_.end()) {
             continue;
         }
-        registration task{.verb = *verb,
-                          .task = each.task,
-                          .info = {.description = each.description,
-                                   .parameters = each.parameters,
-                                   .idempotent = each.idempotent,
-                                   .local = each.local,
-                                   .must_be_signed = each.must_be_signed}};
+        registration task{.verb = *verb, .task = each.task, .info = each.info};
         if (each.handled) {
             task.async = [self = shared_from_this()](const request& what, const responder& answer) {
                 self->run(what, answer);
             };
         }
-        node_.add(std::move(task));
+        pooled_registrar{host_, pool_}.add(std::move(task));
         offered_.push_back(each);
     }
 }
 
+void isolated_plugin::remove(const offered_task& task) {
+    host_.remove(*verb_from(task.verb), task.task);
+    host_.retire_all(task.task);
+}
+
 void isolated_plugin::withdraw() {
     for (const auto& each : offered_) {
-        node_.remove(*verb_from(each.verb), each.task);
-        node_.retire(each.task);
+        remove(each);
     }
     offered_.clear();
     const std::scoped_lock lock{mutex_};
-    unavailable_ = true;
     why_unavailable_ = "the plugin '" + name_ + "' ended too often, and was withdrawn";
     changed_.notify_all();
 }
@@ -307,7 +296,7 @@ void isolated_plugin::publish(std::string_view noun, std::string_view json) {
         if (std::ranges::find(offered_, task, &offered_task::task) == offered_.end()) {
             throw error(errc::denied, "it is no task of the plugin");
         }
-        node_.publish(noun, json_text{std::string{json}});
+        host_.update(noun, json_text{std::string{json}});
     } catch (const error& e) {
         log_output(log_level::warning, "an update of '" + std::string{noun} + "' was dropped: " + e.message());
     }
@@ -324,7 +313,6 @@ void isolated_plugin::begin_stop() {
     std::shared_ptr<plugin_session> running;
     {
         const std::scoped_lock lock{mutex_};
-        unavailable_ = true;
         why_unavailable_ = why;
         running = current_;
         changed_.notify_all();
@@ -363,7 +351,7 @@ isolated_plugin_figures isolated_plugin::figures() const {
 
 // -- log -----------------------------------------------------------------------------------------------------------
 
-void isolated_plugin::log(log_level level, std::string_view text) { node_.log(level, name_, text); }
+void isolated_plugin::log(log_level level, std::string_view text) { log_(level, name_, text); }
 
 // What the process says may be too much.
 void isolated_plugin::log_output(log_level level, std::string_view text, const responder* job) {

@@ -1,24 +1,20 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/error.hpp>
-#include <cles/json_writer.hpp>
-#include <cles/registrar.hpp>
+#include <cles/service.hpp>
 
 #include "isolation/log_budget.hpp"
 #include "isolation/plugin_session.hpp"
 #include "isolation/restart_policy.hpp"
+#include "jobs/job_pool.hpp"
 #include "plugins/loaded_plugin.hpp"
-#include "plugins/plugin_host.hpp"
 
-#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/describe/class.hpp>
 
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -27,16 +23,6 @@
 #include <vector>
 
 namespace cles::runtime {
-
-/// What an isolated plugin uses of the node. Called on the executor.
-struct isolated_plugin_node {
-    boost::asio::any_io_executor executor;
-    std::function<void(registration)> add; ///< on workers; throws as `registrar::add`
-    std::function<void(cles::verb, std::string_view task)> remove;
-    std::function<void(std::string_view noun, json_text)> publish; ///< throws as `service::update`
-    std::function<void(std::string_view task)> retire;             ///< all that the task has published
-    plugin_log log;
-};
 
 /// The state of an isolated plugin, for metrics.
 struct isolated_plugin_figures {
@@ -52,8 +38,8 @@ BOOST_DESCRIBE_STRUCT(isolated_plugin_figures, (), (name, state, process, ended,
 /// tasks are withdrawn when it ends too often.
 class isolated_plugin : public std::enable_shared_from_this<isolated_plugin> {
   public:
-    /// \param loading what the process is told
-    isolated_plugin(isolated_plugin_node node, load_message loading, session_options session);
+    /// Its tasks are those of the service, and their jobs run on the pool. \param loading what the process is told
+    isolated_plugin(service& host, job_pool& pool, plugin_log log, load_message loading, session_options session);
     isolated_plugin(const isolated_plugin&) = delete;
     isolated_plugin& operator=(const isolated_plugin&) = delete;
     ~isolated_plugin() = default;
@@ -79,17 +65,18 @@ class isolated_plugin : public std::enable_shared_from_this<isolated_plugin> {
     void on_started(const started_message& what);
     void on_ended(const process_end& how);
     [[nodiscard]] std::string describe(const process_end& how) const;
-    void fail_to_start(const std::string& why);
-    void restart_or_withdraw(const std::string& why);
     void restart_after(std::chrono::milliseconds delay, const std::string& why);
     void relaunch();
     void offer(const std::vector<offered_task>& tasks);
+    void remove(const offered_task& task);
     void withdraw();
     void publish(std::string_view noun, std::string_view json);
     void log(log_level level, std::string_view text);
     void log_output(log_level level, std::string_view text, const responder* job = nullptr);
 
-    const isolated_plugin_node node_;
+    service& host_;
+    job_pool& pool_;
+    const plugin_log log_;
     load_message loading_;
     const session_options session_options_;
     std::string name_; // the path until it is known
@@ -110,8 +97,7 @@ class isolated_plugin : public std::enable_shared_from_this<isolated_plugin> {
     mutable std::mutex mutex_; // of all that follows, which workers use
     std::shared_ptr<plugin_session> current_;
     std::optional<time_point> missing_since_; // there is no process that takes jobs
-    bool unavailable_ = false;                // withdrawn, or the daemon stops
-    std::string why_unavailable_;
+    std::string why_unavailable_;             // withdrawn, or the daemon stops; else empty
     std::condition_variable changed_;
 };
 

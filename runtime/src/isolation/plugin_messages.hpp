@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/convert.hpp>
+#include <cles/task_info.hpp>
 
 #include "isolation/isolation_limits.hpp"
 
@@ -15,6 +16,13 @@
 
 /// What the daemon and the process of an isolated plugin tell each other with the reserved task `cles`, as bodies of
 /// their lines. The requests of the plugin's own tasks, and their replies, are those of the language.
+
+namespace cles {
+
+// Without `inline_ok`: a handler in another process never runs on the daemon's I/O thread.
+BOOST_DESCRIBE_STRUCT(task_info, (), (description, parameters, idempotent, local, must_be_signed))
+
+} // namespace cles
 
 namespace cles::runtime {
 
@@ -37,17 +45,11 @@ BOOST_DESCRIBE_STRUCT(load_message, (), (node, path, config, sha256, folders, se
 struct offered_task {
     std::string verb;
     std::string task;
-    std::string description;
-    std::vector<std::string> parameters;
-    bool idempotent = false;
-    bool local = false;
-    bool must_be_signed = false;
+    task_info info;
     bool handled = true; ///< false: it can only be bound
-
-    bool operator==(const offered_task&) const = default;
 };
-BOOST_DESCRIBE_STRUCT(offered_task, (),
-                      (verb, task, description, parameters, idempotent, local, must_be_signed, handled))
+BOOST_DESCRIBE_STRUCT(offered_task, (), (verb, task, info, handled))
+inline bool operator==(const offered_task& one, const offered_task& other) { return to_json(one) == to_json(other); }
 
 /// `PUSH self:cles/started`, from the plugin's process.
 struct started_message {

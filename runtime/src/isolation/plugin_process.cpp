@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/plugin_process.hpp"
 
-#include "isolation/plugin_environment.hpp"
-
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -16,6 +15,7 @@
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 namespace cles::runtime {
 
@@ -27,11 +27,6 @@ namespace {
     throw std::system_error(code, std::generic_category(), what);
 }
 
-struct connection_ends {
-    owned_descriptor own;
-    owned_descriptor other;
-};
-
 // Above the numbers that the child uses, so that moving one end there does not replace another.
 owned_descriptor moved_up(owned_descriptor from, int least) {
     const int moved = ::fcntl(from.get(), F_DUPFD_CLOEXEC, least);
@@ -41,13 +36,25 @@ owned_descriptor moved_up(owned_descriptor from, int least) {
     return owned_descriptor{moved};
 }
 
-connection_ends connected_sockets(int least) {
-    std::array<int, 2> pair{};
-    if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) != 0) {
-        throw_process_error("cannot connect the process of a plugin");
+bool is_passed(std::string_view variable) {
+    constexpr std::array<std::string_view, 6> names{"HOME", "LANG", "LANGUAGE", "PATH", "TMPDIR", "TZ"};
+    return std::ranges::find(names, variable) != names.end() || variable.starts_with("LC_") ||
+           variable.starts_with("LD_") || variable.starts_with("MALLOC_") ||
+           variable.ends_with("SAN_OPTIONS"); // of sanitizers
+}
+
+// The variables of the daemon that the process gets: those of the system and its libraries. The others may contain
+// secrets. Ends with a null pointer.
+std::vector<char*> plugin_environment() {
+    std::vector<char*> passed;
+    for (auto** each = environ; *each != nullptr; ++each) {
+        const std::string_view variable{*each};
+        if (is_passed(variable.substr(0, variable.find('=')))) {
+            passed.push_back(*each);
+        }
     }
-    owned_descriptor own{pair[0]};
-    return {std::move(own), moved_up(owned_descriptor{pair[1]}, least)};
+    passed.push_back(nullptr);
+    return passed;
 }
 
 class spawn_settings {
@@ -74,15 +81,19 @@ std::string text_of_signal(int number) {
     return "signal " + std::to_string(number) + (name == nullptr ? "" : " (SIG" + std::string{name} + ")");
 }
 
-plugin_process::plugin_process(const std::string& program, std::string plugin, std::size_t lane_count) {
+plugin_process::plugin_process(std::string plugin, std::size_t lane_count) {
     const int least = control_descriptor + 1 + static_cast<int>(lane_count);
     auto output_ends = make_pipe();
     output_ends.into = moved_up(std::move(output_ends.into), least);
     std::vector<owned_descriptor> theirs;
     const auto connect = [&] {
-        auto both = connected_sockets(least);
-        theirs.push_back(std::move(both.other));
-        return std::move(both.own);
+        std::array<int, 2> pair{};
+        if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, pair.data()) != 0) {
+            throw_process_error("cannot connect the process of a plugin");
+        }
+        owned_descriptor own{pair[0]};
+        theirs.push_back(moved_up(owned_descriptor{pair[1]}, least));
+        return own;
     };
     control = connect();
     for (std::size_t i = 0; i < lane_count; ++i) {
@@ -120,7 +131,7 @@ plugin_process::plugin_process(const std::string& program, std::string plugin, s
     auto parent = std::to_string(::getpid());
     auto count = std::to_string(lane_count);
     std::array<char*, 6> arguments{name.data(), mode.data(), parent.data(), count.data(), plugin.data(), nullptr};
-    const int failed = ::posix_spawn(&id_, program.c_str(), &how.actions, &how.attributes, arguments.data(),
+    const int failed = ::posix_spawn(&id_, "/proc/self/exe", &how.actions, &how.attributes, arguments.data(),
                                      plugin_environment().data());
     if (failed != 0) {
         throw_process_error("cannot start the process of a plugin", failed);

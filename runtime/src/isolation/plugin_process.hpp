@@ -38,8 +38,8 @@ struct process_end {
 /// It inherits sockets that are connected already, so that no address exists to which another process could connect.
 class plugin_process {
   public:
-    /// Starts `program`. \param plugin its file \throws std::system_error
-    plugin_process(const std::string& program, std::string plugin, std::size_t lane_count);
+    /// Starts this program again. \param plugin its file \throws std::system_error
+    plugin_process(std::string plugin, std::size_t lane_count);
     plugin_process(const plugin_process&) = delete;
     plugin_process& operator=(const plugin_process&) = delete;
     ~plugin_process();

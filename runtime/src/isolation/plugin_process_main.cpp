@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/plugin_process_main.hpp"
 
-#include <cles/plugin_abi.h>
-
 #include "isolation/confinement.hpp"
 #include "isolation/descriptor.hpp"
 #include "isolation/line_buffer.hpp"
@@ -68,11 +66,13 @@ class line_reader {
 };
 
 /// Passes updates to the daemon, which takes those of the plugin's own tasks only: so not before it knows these.
-class update_connection {
+class update_connection final : public detail::update_sink {
   public:
     explicit update_connection(control_connection& daemon) noexcept : daemon_(daemon) {}
 
-    void say(std::string_view line) {
+    void publish(std::string_view noun, std::string_view json) override {
+        const auto line =
+            wire_line_writer{verb::update, control_task}.parameter("publish").parameter(noun).body(reply_body(json));
         const std::scoped_lock lock{mutex_};
         if (open_) {
             daemon_.say(line);
@@ -96,41 +96,23 @@ class update_connection {
 /// Passes the tasks of the plugin to the jobs, and its updates to the daemon.
 class process_registrar final : public registrar {
   public:
-    process_registrar(process_jobs& jobs, update_connection& updates) : jobs_(jobs), updates_(updates) {}
+    process_registrar(process_jobs& jobs, std::shared_ptr<detail::update_sink> updates)
+        : jobs_(jobs), updates_(std::move(updates)) {}
 
     void add(registration task) override {
-        const auto& info = task.info;
         offered.push_back({.verb = std::string{to_string(task.verb)},
                            .task = task.task,
-                           .description = info.description,
-                           .parameters = info.parameters,
-                           .idempotent = info.idempotent,
-                           .local = info.local,
-                           .must_be_signed = info.must_be_signed,
+                           .info = task.info,
                            .handled = task.async != nullptr});
         jobs_.add(std::move(task));
     }
-    [[nodiscard]] publisher make_publisher() override { return publisher{std::make_shared<sink>(updates_)}; }
+    [[nodiscard]] publisher make_publisher() override { return publisher{updates_}; }
 
     std::vector<offered_task> offered{};
 
   private:
-    class sink final : public detail::update_sink {
-      public:
-        explicit sink(update_connection& updates) noexcept : updates_(updates) {}
-        void publish(std::string_view noun, std::string_view json) override {
-            std::string line;
-            wire_line_writer{line, verb::update, control_task}.parameter("publish").parameter(noun).body(
-                std::string_view{reply_body(json)});
-            updates_.say(line);
-        }
-
-      private:
-        update_connection& updates_;
-    };
-
     process_jobs& jobs_;
-    update_connection& updates_;
+    std::shared_ptr<detail::update_sink> updates_;
 };
 
 /// The process: its plugin, and the threads of its lanes.
@@ -153,7 +135,7 @@ class plugin_runner {
                                             .confinement = std::move(confined.in_force),
                                             .missing = std::move(confined.missing),
                                             .tasks = tasks.offered});
-            updates_.open();
+            updates_->open();
             return true;
         } catch (const plugin_error& e) {
             tell("refused", refused_message{std::string{e.why()}, e.key()});
@@ -176,7 +158,7 @@ class plugin_runner {
             } else if (what == "progress_unwanted") {
                 jobs_.progress_unwanted(read->number_at(1));
             } else if (what == "answered") {
-                jobs_.resume_on_notifier(*read);
+                jobs_.resume_on_notifier(*line);
             } else if (what == "leaving") {
                 break;
             }
@@ -188,17 +170,11 @@ class plugin_runner {
     [[nodiscard]] plugin_host_options host_options() {
         plugin_host_options options{.node = wanted_.node};
         options.rules = {.secured = wanted_.secured, .folders = {wanted_.folders.begin(), wanted_.folders.end()}};
-        options.folders = options.rules.folders;
         options.trial = std::chrono::milliseconds{0}; // this process is the trial
         options.log = [this](log_level level, std::string_view plugin, std::string_view text) {
-            if (const auto job = process_jobs::traced_here(); job != 0) { // the daemon adds its trace
-                std::string line;
-                wire_line_writer{line, verb::push, control_task}.parameter("log").parameter(job).body(
-                    log_message{static_cast<std::uint32_t>(level), std::string{plugin} + ": " + std::string{text}});
-                daemon_.say(line);
-                return;
-            }
-            tell("log", log_message{static_cast<std::uint32_t>(level), std::string{text}});
+            // The daemon adds the trace of a job, but not the plugin's name.
+            const auto job = process_jobs::traced_here();
+            daemon_.log(level, job == 0 ? std::string{text} : std::string{plugin} + ": " + std::string{text}, job);
         };
         return options;
     }
@@ -215,9 +191,7 @@ class plugin_runner {
 
     template <class T>
     void tell(std::string_view what, const T& body) {
-        std::string line;
-        wire_line_writer{line, verb::push, control_task}.parameter(what).body(body);
-        daemon_.say(line);
+        daemon_.say(wire_line_writer{verb::push, control_task}.parameter(what).body(body));
     }
 
     // One request after another.
@@ -233,9 +207,9 @@ class plugin_runner {
                 try {
                     jobs_.resume(*read);
                 } catch (const std::exception& e) {
-                    tell("log", log_message{CLES_LOG_ERROR, std::string{"a callback threw: "} + e.what()});
+                    daemon_.log(log_level::error, std::string{"a callback threw: "} + e.what());
                 } catch (...) {
-                    tell("log", log_message{CLES_LOG_ERROR, "a callback threw"});
+                    daemon_.log(log_level::error, "a callback threw");
                 }
                 reply = "id=1 {}\n";
             } else {
@@ -250,7 +224,7 @@ class plugin_runner {
     const load_message& wanted_;
     std::size_t lanes_;
     control_connection daemon_{control_descriptor};
-    update_connection updates_{daemon_};
+    std::shared_ptr<update_connection> updates_ = std::make_shared<update_connection>(daemon_);
     process_jobs jobs_{daemon_};
     plugin_host host_;
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/plugin_session.hpp"
 
+#include <cles/convert.hpp>
 #include <cles/json_reader.hpp>
-#include <cles/json_writer.hpp>
 
 #include <boost/asio/post.hpp>
 
@@ -27,6 +27,7 @@ constexpr std::size_t max_control_read = 65536;
 // What the process may leave unread. It reads at once, unless it has been stopped.
 constexpr std::size_t max_pending = 64U << 20U;
 constexpr std::size_t max_output_line = 1000;
+constexpr std::size_t max_asks = 4096; // requests that its jobs may wait for
 // How long the process may take to end after it has closed a connection.
 constexpr std::chrono::milliseconds end_time{100};
 
@@ -40,8 +41,8 @@ std::string grace_text(std::chrono::nanoseconds span) {
     return ms % 1000 == 0 ? std::to_string(ms / 1000) + " s" : std::to_string(ms) + " ms";
 }
 
-void append_request(std::string& to, std::uint64_t id, const request& what) {
-    wire_line_writer line{to, what.verb(), what.task()};
+std::string request_line(std::uint64_t id, const request& what) {
+    wire_line_writer line{what.verb(), what.task()};
     for (const auto parameter : what.parameters()) {
         line.parameter(parameter);
     }
@@ -63,7 +64,7 @@ void append_request(std::string& to, std::uint64_t id, const request& what) {
     if (!what.trace().empty()) {
         line.adverb("trace", what.trace());
     }
-    line.body(what.body());
+    return line.body(what.body());
 }
 
 std::string job_label(const request& what) {
@@ -79,8 +80,8 @@ std::chrono::nanoseconds patience_of(std::chrono::nanoseconds grace) {
 plugin_session::plugin_session(asio::any_io_executor executor, std::string name, session_options options,
                                session_events events)
     : executor_(std::move(executor)), options_(std::move(options)), events_(std::move(events)),
-      process_(options_.program, options_.plugin, options_.lanes), control_(process_.control.get()),
-      output_(process_.output.get()), name_(std::move(name)), lanes_(options_.lanes) {
+      process_(options_.plugin, options_.lanes), control_(process_.control.get()), output_(process_.output.get()),
+      name_(std::move(name)), lanes_(options_.lanes) {
     for (std::size_t i = 0; i < lanes_.size(); ++i) {
         lanes_[i].socket = process_.lanes[i].get();
         free_lanes_.push_back(&lanes_[i]);
@@ -126,10 +127,8 @@ bool plugin_session::serve(const request& what, const responder& answer) {
             self->stop(id);
         }
     });
-    std::string line;
-    append_request(line, id, what);
     std::string reply;
-    const auto how = exchange(*on, line, reply);
+    const auto how = exchange(*on, request_line(id, what), reply);
     if (how != exchanged::replied) {
         // Nothing else uses the lane any more.
         const bool started = how == exchanged::lost;
@@ -213,7 +212,7 @@ void plugin_session::settle(const job& of, std::string_view body) {
         if (failed->retry_ms) {
             of.answer.refuse(failed->message, std::chrono::milliseconds{*failed->retry_ms});
         } else {
-            of.answer.fail(errc_from_wire(failed->code), failed->message);
+            of.answer.fail(errc_from_wire(failed->error), failed->message);
         }
     } else if (body == "{}") {
         of.answer.done();
@@ -246,9 +245,7 @@ void plugin_session::stop(std::uint64_t id) {
         return;
     }
     stopped->due = std::min(stopped->due.load(), clock::now());
-    std::string line;
-    wire_line_writer{line, verb::push, control_task}.parameter("cancel").parameter(id).adverb("reply", "no").body("{}");
-    say(line);
+    say(wire_line_writer{verb::push, control_task}.parameter("cancel").parameter(id).adverb("reply", "no").body("{}"));
 }
 
 // Runs a callback of a job that has started. Called on a worker, as a part of the job.
@@ -315,9 +312,7 @@ void plugin_session::wait_to_write() {
 }
 
 void plugin_session::load(const load_message& what) {
-    std::string line;
-    wire_line_writer{line, verb::push, control_task}.parameter("load").body(what);
-    say(line);
+    say(wire_line_writer{verb::push, control_task}.parameter("load").body(what));
 }
 
 void plugin_session::leave(std::string_view why) {
@@ -325,9 +320,7 @@ void plugin_session::leave(std::string_view why) {
         const std::scoped_lock lock{mutex_};
         left_because_ = why;
     }
-    std::string line;
-    wire_line_writer{line, verb::push, control_task}.parameter("leaving").adverb("reply", "no").body("{}");
-    say(line);
+    say(wire_line_writer{verb::push, control_task}.parameter("leaving").adverb("reply", "no").body("{}"));
 }
 
 void plugin_session::set_name(std::string name) {
@@ -567,13 +560,11 @@ void plugin_session::on_reply(const wire_line& line) {
     }
     if (!of->answer.progress(fraction, json_text{std::string{line.body}}) && !of->answer.stopped()) {
         of->progress_unwanted = true;
-        std::string answer;
-        wire_line_writer{answer, verb::push, control_task}
-            .parameter("progress_unwanted")
-            .parameter(line.id)
-            .adverb("reply", "no")
-            .body("{}");
-        say(answer);
+        say(wire_line_writer{verb::push, control_task}
+                .parameter("progress_unwanted")
+                .parameter(line.id)
+                .adverb("reply", "no")
+                .body("{}"));
     }
 }
 
@@ -624,14 +615,13 @@ void plugin_session::ask(const wire_line& line) {
         if (!self) {
             return;
         }
-        std::string text;
-        wire_line_writer reply{text, verb::push, control_task};
+        wire_line_writer reply{verb::push, control_task};
         reply.parameter("answered").parameter(ticket);
         if (code) {
             const auto known = code.category() == error_category() ? static_cast<errc>(code.value()) : errc::failed;
             reply.adverb("code", wire_name(known)).adverb("message", message);
         }
-        reply.body(json.empty() ? std::string_view{"{}"} : json);
+        const auto text = reply.body(json.empty() ? std::string_view{"{}"} : json);
         by ? self->resume(by, text) : self->say(text);
     };
     const auto by = find(line.number_at(1));
@@ -639,7 +629,7 @@ void plugin_session::ask(const wire_line& line) {
         answered(nullptr, errc::cancelled, "{}", "the requester of the job no longer waits");
         return;
     }
-    if (asks_.fetch_add(1) >= options_.max_asks) {
+    if (asks_.fetch_add(1) >= max_asks) {
         --asks_;
         answered(nullptr, errc::busy, "{}", "too many requests at once");
         return;
@@ -651,15 +641,11 @@ void plugin_session::ask(const wire_line& line) {
     if (wanted.progress) {
         options.on_progress([weak = weak_from_this(), by, ticket](double fraction, std::string_view json) {
             if (const auto self = weak.lock()) {
-                std::string number;
-                json_writer{number}.value(fraction);
-                std::string text;
-                wire_line_writer{text, verb::push, control_task}
-                    .parameter("reported")
-                    .parameter(ticket)
-                    .adverb("progress", number)
-                    .body(json);
-                self->resume(by, text);
+                self->resume(by, wire_line_writer{verb::push, control_task}
+                                     .parameter("reported")
+                                     .parameter(ticket)
+                                     .adverb("progress", to_json(fraction))
+                                     .body(json));
                 ++by->waits;
             }
         });

@@ -32,12 +32,10 @@
 namespace cles::runtime {
 
 struct session_options {
-    std::string program;              ///< see `plugin_process`
     std::string plugin;               ///< its file
     std::size_t lanes = 1;            ///< how many jobs may run at once
     std::chrono::nanoseconds grace{}; ///< for jobs to end after their deadline
     std::size_t max_line = 4U << 20U; ///< bytes that the process may send in one line
-    std::size_t max_asks = 4096;      ///< requests that its jobs may wait for
 };
 
 /// How long a job may take to end after its deadline. Somewhat shorter than the grace, so that the pool does not take

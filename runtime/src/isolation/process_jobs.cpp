@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/process_jobs.hpp"
 
+#include <cles/convert.hpp>
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
-#include <cles/json_writer.hpp>
 #include <cles/limits.hpp>
 
 #include "isolation/descriptor.hpp"
 #include "isolation/plugin_messages.hpp"
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <exception>
@@ -46,6 +47,15 @@ void control_connection::say(std::string_view lines) {
     }
 }
 
+void control_connection::log(log_level level, std::string_view text, std::uint64_t job) {
+    wire_line_writer line{verb::push, control_task};
+    line.parameter("log");
+    if (job != 0) {
+        line.parameter(job);
+    }
+    say(line.body(log_message{static_cast<std::uint32_t>(level), std::string{text}}));
+}
+
 std::uint64_t control_connection::lines_sent_by_this_thread() noexcept { return lines_sent; }
 
 // -- a job ---------------------------------------------------------------------------------------------------------
@@ -61,7 +71,8 @@ class process_jobs::call final : public detail::call_control {
         if (!answered_) {
             call::fail(errc::failed, "the job ended without an answer");
         }
-        jobs_.forget(id_);
+        const std::scoped_lock lock{jobs_.mutex_};
+        jobs_.calls_.erase(id_);
     }
 
     void done(std::string_view json) override {
@@ -73,56 +84,44 @@ class process_jobs::call final : public detail::call_control {
     }
     void fail(errc code, std::string_view message) override {
         if (!answered_.exchange(true)) {
-            answer(failure_body(wire_name(code), message, std::nullopt));
+            answer(failure_body({std::string{wire_name(code)}, std::string{message}}));
         }
     }
     void refuse(std::string_view message, std::chrono::milliseconds retry) override {
         if (!answered_.exchange(true)) {
-            answer(failure_body(wire_name(errc::busy), message, retry.count()));
+            answer(failure_body({std::string{wire_name(errc::busy)}, std::string{message}, retry.count()}));
         }
     }
     bool progress(double fraction, std::string_view json) override {
-        if (stopped_ || answered_ || progress_unwanted_) {
+        if (stopped() || answered_ || progress_unwanted_) {
             return false;
         }
-        std::string number;
-        json_writer{number}.value(std::isnan(fraction) ? 0 : fraction);
-        std::string line;
-        wire_line_writer{line, id_}.adverb("progress", number).body(json);
-        jobs_.daemon_.say(line);
+        const auto number = to_json(std::isnan(fraction) ? 0 : fraction);
+        jobs_.daemon_.say(wire_line_writer{id_}.adverb("progress", number).body(json));
         return true;
     }
-    void on_stop(std::function<void()> callback) override {
-        {
-            const std::scoped_lock lock{mutex_};
-            if (!stopped_) {
-                on_stop_.swap(callback);
-                return;
-            }
-        }
-        if (callback) {
-            callback();
-        }
-    }
-    [[nodiscard]] bool stopped() const noexcept override { return stopped_; }
+    void on_stop(std::function<void()> callback) override { on_stop_.set(std::move(callback)); }
+    [[nodiscard]] bool stopped() const noexcept override { return on_stop_.stopped(); }
     void delegate(std::string_view command, const call_options& options, answer_callback answered) override {
-        const auto ticket =
-            jobs_.open_request(std::make_shared<asked>(asked{std::move(answered), options.on_progress_}));
-        std::string line;
-        wire_line_writer{line, verb::delegate, control_task}.parameter("ask").parameter(id_).parameter(ticket).body(
-            ask_message{.command = std::string{command},
-                        .at = options.at_,
-                        .urgent = options.urgent_,
-                        .hops = options.hops_,
-                        .deadline_ms = options.deadline_.count(),
-                        .progress = options.on_progress_ != nullptr});
-        jobs_.daemon_.say(line);
+        const auto request = std::make_shared<asked>(asked{std::move(answered), options.on_progress_});
+        std::uint64_t ticket = 0;
+        {
+            const std::scoped_lock lock{jobs_.mutex_};
+            ticket = ++jobs_.last_ticket_;
+            jobs_.requests_.emplace(ticket, request);
+        }
+        const ask_message wanted{.command = std::string{command},
+                                 .at = options.at_,
+                                 .urgent = options.urgent_,
+                                 .hops = options.hops_,
+                                 .deadline_ms = options.deadline_.count(),
+                                 .progress = options.on_progress_ != nullptr};
+        jobs_.daemon_.say(
+            wire_line_writer{verb::delegate, control_task}.parameter("ask").parameter(id_).parameter(ticket).body(
+                wanted));
     }
     void log(log_level level, std::string_view text) override {
-        std::string line;
-        wire_line_writer{line, verb::push, control_task}.parameter("log").parameter(id_).body(
-            log_message{static_cast<std::uint32_t>(level), std::string{text.substr(0, max_log_text)}});
-        jobs_.daemon_.say(line);
+        jobs_.daemon_.log(level, text.substr(0, max_log_text), id_);
     }
     [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
 
@@ -136,18 +135,12 @@ class process_jobs::call final : public detail::call_control {
     std::optional<std::string> end() {
         current = nullptr;
         if (traced_ && direct_ && sent_before_ != control_connection::lines_sent_by_this_thread()) {
-            std::string line;
-            wire_line_writer{line, id_}.body(*std::exchange(direct_, std::nullopt));
-            jobs_.daemon_.say(line);
+            jobs_.daemon_.say(wire_line_writer{id_}.body(*std::exchange(direct_, std::nullopt)));
         }
         return std::move(direct_);
     }
     /// The requester waits no more. Returns the callback, to be called on a thread where it may take long.
-    std::function<void()> stop() {
-        const std::scoped_lock lock{mutex_};
-        stopped_ = true;
-        return std::exchange(on_stop_, nullptr);
-    }
+    std::function<void()> stop() { return on_stop_.stop(); }
     void set_progress_unwanted() noexcept { progress_unwanted_ = true; }
 
     [[nodiscard]] static std::uint64_t traced_here() noexcept {
@@ -161,25 +154,19 @@ class process_jobs::call final : public detail::call_control {
         if (current == this && sent_before_ == control_connection::lines_sent_by_this_thread()) {
             direct_ = std::move(body);
         } else {
-            std::string line;
-            wire_line_writer{line, id_}.body(body);
-            jobs_.daemon_.say(line);
+            jobs_.daemon_.say(wire_line_writer{id_}.body(body));
         }
-        std::function<void()> dropped; // a job that has answered is not told to stop any more
-        const std::scoped_lock lock{mutex_};
-        dropped.swap(on_stop_);
+        on_stop_.drop();
     }
 
     process_jobs& jobs_;
     const std::uint64_t id_;
     const bool traced_;
     std::atomic<bool> answered_{false};
-    std::atomic<bool> stopped_{false};
     std::atomic<bool> progress_unwanted_{false};
     std::uint64_t sent_before_ = 0;
     std::optional<std::string> direct_{};
-    std::mutex mutex_;
-    std::function<void()> on_stop_{};
+    stop_callback on_stop_;
 };
 
 thread_local const process_jobs::call* process_jobs::call::current = nullptr;
@@ -228,36 +215,31 @@ std::string process_jobs::serve(const wire_line& line, std::string_view node) {
         detail::fail_with(*handled, std::current_exception());
     }
     const auto direct = handled->end();
-    std::string reply;
-    wire_line_writer writer{reply, line.id};
-    if (direct) {
-        writer.body(*direct);
-    } else {
-        writer.adverb("later", "yes").body("{}");
-    }
-    return reply;
+    wire_line_writer reply{line.id};
+    return direct ? reply.body(*direct) : reply.adverb("later", "yes").body("{}");
 }
 
 void process_jobs::resume(const wire_line& line) {
-    const auto ticket = line.number_at(1);
+    const bool reported = line.parameters.front() == "reported";
     std::shared_ptr<asked> request;
     {
         const std::scoped_lock lock{mutex_};
-        if (const auto found = requests_.find(ticket); found != requests_.end()) {
-            request = found->second;
+        const auto found = requests_.find(line.number_at(1));
+        if (found == requests_.end()) {
+            return;
+        }
+        request = found->second;
+        if (!reported) {
+            requests_.erase(found);
         }
     }
-    if (!request) {
-        return;
-    }
-    if (line.parameters.front() == "reported") {
+    if (reported) {
         double fraction = 0;
         if (request->progress && json_reader{line.adverb("progress")}.read(fraction)) {
             request->progress(fraction, line.body);
         }
         return;
     }
-    close_request(ticket);
     const auto code = line.adverb("code");
     request->answered(code.empty() ? boost::system::error_code{} : errc_from_wire(code), line.body,
                       line.adverb("message"));
@@ -280,12 +262,8 @@ void process_jobs::cancel(std::uint64_t id) {
         callback = found->second->stop();
     }
     if (callback) {
-        notifier_.notify({.callback = std::move(callback), .log = [this](log_level level, const std::string& text) {
-                              std::string line;
-                              wire_line_writer{line, verb::push, control_task}.parameter("log").body(
-                                  log_message{static_cast<std::uint32_t>(level), text});
-                              daemon_.say(line);
-                          }});
+        notifier_.notify({.callback = std::move(callback),
+                          .log = [this](log_level level, const std::string& text) { daemon_.log(level, text); }});
     }
 }
 
@@ -296,37 +274,9 @@ void process_jobs::progress_unwanted(std::uint64_t id) {
     }
 }
 
-void process_jobs::resume_on_notifier(const wire_line& line) {
-    // The copy's views are of its own text.
-    const auto kept = std::make_shared<wire_line>(line);
-    const auto text = std::make_shared<std::string>(line.body);
-    kept->body = *text;
-    kept->adverbs.clear();
-    static constexpr std::string_view keys[] = {"code", "message", "progress"};
-    for (const auto key : keys) {
-        if (const auto value = line.adverb(key); !value.empty()) {
-            kept->adverbs.emplace_back(key, std::string{value});
-        }
-    }
-    notifier_.notify({.callback = [this, kept, text] { resume(*kept); }});
-}
-
-// -- the tables ----------------------------------------------------------------------------------------------------
-
-std::uint64_t process_jobs::open_request(std::shared_ptr<asked> what) {
-    const std::scoped_lock lock{mutex_};
-    requests_.emplace(++last_ticket_, std::move(what));
-    return last_ticket_;
-}
-
-void process_jobs::close_request(std::uint64_t ticket) {
-    const std::scoped_lock lock{mutex_};
-    requests_.erase(ticket);
-}
-
-void process_jobs::forget(std::uint64_t id) {
-    const std::scoped_lock lock{mutex_};
-    calls_.erase(id);
+void process_jobs::resume_on_notifier(std::string_view line) {
+    // What is read from a line are views of it, so it is read again there.
+    notifier_.notify({.callback = [this, kept = std::string{line}] { resume(read_wire_line(kept).value()); }});
 }
 
 } // namespace cles::runtime

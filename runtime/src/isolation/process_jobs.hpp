@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/log.hpp>
 #include <cles/publisher.hpp>
 #include <cles/registrar.hpp>
 #include <cles/responder.hpp>
 
 #include "isolation/wire_line.hpp"
+#include "jobs/stop_callback.hpp"
 #include "jobs/stop_notifier.hpp"
 
 #include <boost/unordered/unordered_flat_map.hpp>
-#include <boost/unordered/unordered_flat_set.hpp>
 
-#include <atomic>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -33,6 +33,8 @@ class control_connection {
 
     /// Waits until the daemon has read enough to take it.
     void say(std::string_view lines);
+    /// Has the daemon log it. \param job that it is about; 0: none
+    void log(log_level level, std::string_view text, std::uint64_t job = 0);
     /// To keep what follows in order.
     [[nodiscard]] static std::uint64_t lines_sent_by_this_thread() noexcept;
 
@@ -63,8 +65,8 @@ class process_jobs {
     // From the control connection:
     void cancel(std::uint64_t id);
     void progress_unwanted(std::uint64_t id);
-    /// The same as `resume`, on another thread.
-    void resume_on_notifier(const wire_line& line);
+    /// The same as `resume`, on another thread. \param line has been read without an error
+    void resume_on_notifier(std::string_view line);
 
   private:
     class call;
@@ -72,10 +74,6 @@ class process_jobs {
         answer_callback answered;
         std::function<void(double, std::string_view)> progress;
     };
-
-    std::uint64_t open_request(std::shared_ptr<asked> what);
-    void close_request(std::uint64_t ticket);
-    void forget(std::uint64_t id);
 
     control_connection& daemon_;
     std::map<std::pair<verb, std::string>, async_handler, std::less<>> tasks_;

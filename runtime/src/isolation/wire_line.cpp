@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/wire_line.hpp"
 
-#include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 
 namespace cles::runtime {
 namespace {
@@ -29,13 +26,6 @@ void append_encoded(std::string& to, std::string_view text) {
             to.push_back(hex_digits[byte & 15U]);
         }
     }
-}
-
-template <class Integer>
-void append_number(std::string& to, Integer number) {
-    std::array<char, 24> text{};
-    const auto [end, failed] = std::to_chars(text.data(), text.data() + text.size(), number);
-    to.append(text.data(), end);
 }
 
 std::optional<std::string> decode(std::string_view text) {
@@ -107,40 +97,34 @@ bool read_adverb(std::string_view word, wire_line& into) {
 
 } // namespace
 
-wire_line_writer::wire_line_writer(std::string& to, cles::verb verb, std::string_view task) : to_(to) {
-    to_.append(to_string(verb)).append(" self:").append(task);
+wire_line_writer::wire_line_writer(cles::verb verb, std::string_view task) : line_(to_string(verb)) {
+    line_.append(" self:").append(task);
 }
 
-wire_line_writer::wire_line_writer(std::string& to, std::uint64_t id) : to_(to) {
-    to_.append("id=");
-    append_number(to_, id);
-}
+wire_line_writer::wire_line_writer(std::uint64_t id) : line_("id=" + std::to_string(id)) {}
 
 wire_line_writer& wire_line_writer::parameter(std::string_view text) {
-    to_.push_back('/');
-    append_encoded(to_, text);
+    line_.push_back('/');
+    append_encoded(line_, text);
     return *this;
 }
 
-wire_line_writer& wire_line_writer::parameter(std::uint64_t number) {
-    to_.push_back('/');
-    append_number(to_, number);
-    return *this;
-}
+wire_line_writer& wire_line_writer::parameter(std::uint64_t number) { return parameter(std::to_string(number)); }
 
 wire_line_writer& wire_line_writer::adverb(std::string_view key, std::string_view value) {
-    to_.append(" ").append(key).push_back('=');
-    append_encoded(to_, value);
+    line_.append(" ").append(key).push_back('=');
+    append_encoded(line_, value);
     return *this;
 }
 
 wire_line_writer& wire_line_writer::adverb(std::string_view key, std::int64_t value) {
-    to_.append(" ").append(key).push_back('=');
-    append_number(to_, value);
-    return *this;
+    return adverb(key, std::to_string(value));
 }
 
-void wire_line_writer::body(std::string_view json) { to_.append(" ").append(json).push_back('\n'); }
+std::string wire_line_writer::body(std::string_view json) {
+    line_.append(" ").append(json).push_back('\n');
+    return std::move(line_);
+}
 
 std::string_view wire_line::adverb(std::string_view key) const noexcept {
     const auto found = std::ranges::find(adverbs, key, [](const auto& each) { return each.first; });
@@ -190,19 +174,10 @@ std::string reply_body(std::string_view json) {
     return R"({"value":)" + std::string{json} + "}";
 }
 
-std::string failure_body(std::string_view code, std::string_view message, std::optional<std::int64_t> retry_ms) {
+std::string failure_body(const wire_failure& what) {
     std::string out;
     json_writer w{out};
-    w.begin_object();
-    w.key("error");
-    w.value(code);
-    w.key("message");
-    w.value(message);
-    if (retry_ms) {
-        w.key("retry_ms");
-        w.value(*retry_ms);
-    }
-    w.end_object();
+    write_json(w, what); // not `to_json`, because the message may be any bytes
     return out;
 }
 
@@ -210,26 +185,14 @@ std::optional<wire_failure> read_failure(std::string_view body) {
     if (!body.starts_with(R"({"error":)")) {
         return std::nullopt;
     }
-    wire_failure read{.code = "failed", .message = "the process of the plugin sent an invalid failure", .retry_ms = {}};
-    wire_failure told;
-    json_reader r{body};
-    std::string_view key;
-    if (r.begin_object()) {
-        while (r.next_key(key)) {
-            const std::string name{key};
-            std::int64_t retry = 0;
-            if (name == "error") {
-                r.read(told.code);
-            } else if (name == "message") {
-                r.read(told.message);
-            } else if (name == "retry_ms" && r.read(retry)) {
-                told.retry_ms = std::clamp<std::int64_t>(retry, 0, 86'400'000);
-            } else {
-                r.skip();
-            }
-        }
+    wire_failure read;
+    if (!from_json(body, read)) {
+        return wire_failure{.error = "failed", .message = "the process of the plugin sent an invalid failure"};
     }
-    return r.ok() && r.at_end() ? told : read;
+    if (read.retry_ms) {
+        read.retry_ms = std::clamp<std::int64_t>(*read.retry_ms, 0, 86'400'000);
+    }
+    return read;
 }
 
 } // namespace cles::runtime

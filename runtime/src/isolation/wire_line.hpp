@@ -4,6 +4,8 @@
 #include <cles/convert.hpp>
 #include <cles/verb.hpp>
 
+#include <boost/describe/class.hpp>
+
 #include <charconv>
 #include <concepts>
 #include <cstddef>
@@ -28,27 +30,27 @@ std::optional<Integer> to_number(std::string_view text) noexcept {
     return failed == std::errc{} && end == text.data() + text.size() ? std::optional{number} : std::nullopt;
 }
 
-/// Appends one line to a buffer. Parameters and the values of adverbs are percent-encoded.
+/// Writes one line. Parameters and the values of adverbs are percent-encoded.
 class wire_line_writer {
   public:
     /// A request to `self:task`.
-    wire_line_writer(std::string& to, cles::verb verb, std::string_view task);
+    wire_line_writer(cles::verb verb, std::string_view task);
     /// A reply to the request with that id.
-    wire_line_writer(std::string& to, std::uint64_t id);
+    explicit wire_line_writer(std::uint64_t id);
 
     // In this order:
     wire_line_writer& parameter(std::string_view text);
     wire_line_writer& parameter(std::uint64_t number);
     wire_line_writer& adverb(std::string_view key, std::string_view value);
     wire_line_writer& adverb(std::string_view key, std::int64_t value);
-    /// Ends the line. \param json an object or an array
-    void body(std::string_view json);
+    /// Ends the line, and returns it. \param json an object or an array
+    [[nodiscard]] std::string body(std::string_view json);
     template <class T>
         requires(!std::convertible_to<T, std::string_view>)
-    void body(const T& value) { body(std::string_view{to_json(value)}); }
+    [[nodiscard]] std::string body(const T& value) { return body(std::string_view{to_json(value)}); }
 
   private:
-    std::string& to_;
+    std::string line_;
 };
 
 /// A line that was read. Its text is a view of the line.
@@ -74,14 +76,14 @@ std::optional<wire_line> read_wire_line(std::string_view line);
 /// The body of a reply: JSON as it is if it is an object or an array, nothing as {}, and anything else as {"value":x}.
 std::string reply_body(std::string_view json);
 /// The body of a reply that is a failure.
-std::string failure_body(std::string_view code, std::string_view message, std::optional<std::int64_t> retry_ms);
-
-/// A failure, as it was read.
 struct wire_failure {
-    std::string code;
+    std::string error; ///< its code
     std::string message;
-    std::optional<std::int64_t> retry_ms;
+    std::optional<std::int64_t> retry_ms{};
 };
+BOOST_DESCRIBE_STRUCT(wire_failure, (), (error, message, retry_ms))
+CLES_DEFAULTS(wire_failure, (message))
+std::string failure_body(const wire_failure& what);
 /// Nothing if the body of a reply is a success.
 std::optional<wire_failure> read_failure(std::string_view body);
 

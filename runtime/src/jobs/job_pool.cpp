@@ -248,7 +248,7 @@ job_dispatcher::stopped_job job_dispatcher::stop(job_record& r) {
     pauses_.count_input();
     r.report_times();
     awaited_ -= r.requester_ && !r.stopped() ? 1 : 0;
-    auto callback = r.stop();
+    auto callback = r.on_stop_.stop();
     const bool moved = r.moved_ != 0;
     if (moved) {
         sharing_->withdraw(r.moved_);

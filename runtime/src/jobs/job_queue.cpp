@@ -15,12 +15,13 @@ constexpr std::size_t max_idle = 64;
 job_queue::requesters::iterator job_queue::queue_for(item& job) {
     auto found = known_.find(job.requester);
     if (found == known_.end()) {
-        if (spare_.empty()) {
-            spare_.emplace_back();
+        if (idle_.size() < max_idle) {
+            idle_.emplace_front();
+        } else { // the memory of the one that has been idle for longest
+            known_.erase(idle_.front().requester);
         }
-        spare_.front().requester = job.requester;
-        found = known_.emplace(job.requester, spare_.begin()).first;
-        idle_.splice(idle_.end(), spare_, spare_.begin());
+        found = known_.emplace(job.requester, idle_.begin()).first;
+        idle_.front().requester = job.requester;
     }
     const auto own = found->second;
     if (own->jobs.empty()) {
@@ -70,15 +71,9 @@ void job_queue::unlink(requesters::iterator from, item& job) noexcept {
         return;
     }
     idle_.splice(idle_.end(), with_jobs_, from);
-    // Once there are many, so that the cost per job is constant.
-    if (idle_.size() > std::max(max_idle, known_.size() / 2)) {
-        for (const auto& each : idle_) {
-            known_.erase(each.requester);
-        }
-        spare_.splice(spare_.end(), idle_);
-        while (spare_.size() > max_idle) {
-            spare_.pop_back();
-        }
+    while (idle_.size() > std::max(max_idle, known_.size() / 2)) {
+        known_.erase(idle_.front().requester);
+        idle_.pop_front();
     }
 }
 

@@ -93,8 +93,7 @@ class job_queue {
     std::uint64_t last_turn_ = 0;
     boost::unordered_flat_map<std::uint64_t, requesters::iterator> known_; // those in the next two
     requesters with_jobs_;                                                 // by turn: the first is served next
-    requesters idle_;                                                      // without jobs
-    requesters spare_;                                                     // their memory is reused
+    requesters idle_;                                                      // without jobs, the latest at the end
 };
 
 template <class F>

@@ -27,9 +27,7 @@ void job_record::open(std::shared_ptr<job_dispatcher> dispatcher) {
     dispatcher_ = std::move(dispatcher);
     references_.store(1, std::memory_order_relaxed);
     answered_.store(false, std::memory_order_relaxed);
-    stopped_.store(false, std::memory_order_relaxed);
     progress_unwanted_.store(false, std::memory_order_relaxed);
-    has_on_stop_.store(false, std::memory_order_relaxed);
     result_written_ = started = false;
 }
 
@@ -47,7 +45,7 @@ void job_record::clear() {
     dispatcher_.reset();
     task_.reset();
     reports_.clear();
-    on_stop_ = nullptr;
+    on_stop_.reset();
     failure_.reset();
     retry_.reset();
     result_.clear();
@@ -156,13 +154,7 @@ bool job_record::claim_answer() noexcept {
     if (is_traced()) {
         times_.freeze(time_point::clock::now());
     }
-    // A job that has answered is not told to stop any more. Its callback is destroyed here, on the job's thread, and
-    // not on the executor.
-    if (has_on_stop_.load(std::memory_order_acquire)) {
-        std::function<void()> dropped;
-        const std::lock_guard lock{mutex_};
-        dropped.swap(on_stop_);
-    }
+    on_stop_.drop(); // here, on the job's thread, and not on the executor
     return true;
 }
 
@@ -246,29 +238,6 @@ void job_record::send_progress() {
         }
     }
     sent_reports_.clear();
-}
-
-// -- stop ----------------------------------------------------------------------------------------------------------
-
-void job_record::on_stop(std::function<void()> callback) {
-    {
-        const std::lock_guard lock{mutex_};
-        if (!stopped()) {
-            on_stop_.swap(callback);
-            has_on_stop_.store(true, std::memory_order_release);
-            return;
-        }
-    }
-    if (callback) {
-        callback();
-    }
-}
-
-// Returns the callback, to be called on a thread where it may take long.
-std::function<void()> job_record::stop() {
-    const std::lock_guard lock{mutex_};
-    stopped_.store(true, std::memory_order_release);
-    return std::exchange(on_stop_, nullptr);
 }
 
 // -- the rest of a responder's functions ---------------------------------------------------------------------------

@@ -15,6 +15,7 @@
 #include "jobs/adaptive_mutex.hpp"
 #include "jobs/job_queue.hpp"
 #include "jobs/job_times.hpp"
+#include "jobs/stop_callback.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/smart_ptr/intrusive_ptr.hpp>
@@ -29,6 +30,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::runtime {
@@ -59,9 +61,9 @@ class job_record final : public job_queue::item, public detail::call_control {
     bool progress(double fraction, std::string_view json) override;
     /// Calls back on a thread that only makes these calls; or at once, in this thread, if the job has been stopped. A
     /// later callback replaces an earlier one.
-    void on_stop(std::function<void()> callback) override;
+    void on_stop(std::function<void()> callback) override { on_stop_.set(std::move(callback)); }
     /// The job has been withdrawn, its link is lost, its time is over, or the pool ends.
-    [[nodiscard]] bool stopped() const noexcept override { return stopped_.load(std::memory_order_acquire); }
+    [[nodiscard]] bool stopped() const noexcept override { return on_stop_.stopped(); }
     /// No worker is held while the request waits: the callback runs on a worker as a continuation of this job. The
     /// start and the continuations of one job never run at the same time. If the pool ends first, the callback gets
     /// `unavailable`; it is dropped without a call only if no worker becomes free for it in time, because all that are
@@ -133,7 +135,6 @@ class job_record final : public job_queue::item, public detail::call_control {
     void run_guarded(F&& work) noexcept;
     [[nodiscard]] bool claim_answer() noexcept;
     void answer(std::string_view text, std::optional<errc> failure, std::optional<std::chrono::milliseconds> retry);
-    std::function<void()> stop();
     void send_progress();
     void send_answer();
     void report_times();
@@ -141,12 +142,10 @@ class job_record final : public job_queue::item, public detail::call_control {
     // -- any thread ------------------------------------------------------------------------------------------------
     std::atomic<int> references_{0};
     std::atomic<bool> answered_{false}; // the thread that sets it writes the result
-    std::atomic<bool> stopped_{false};
     std::atomic<bool> progress_unwanted_{false};
-    std::atomic<bool> has_on_stop_{false};
-    adaptive_mutex mutex_; // of the next two
+    stop_callback on_stop_;
+    adaptive_mutex mutex_; // of the reports
     std::vector<progress_report> reports_;
-    std::function<void()> on_stop_;
     std::string result_;
     std::optional<errc> failure_;                    // then the result is its message
     std::optional<std::chrono::milliseconds> retry_; // of a refusal

@@ -28,8 +28,18 @@ class inline_timer {
 } // namespace
 
 void pooled_registrar::add(registration task) {
+    const auto time_inline = [this](auto& handler) {
+        if (handler) {
+            handler = [timed = std::move(handler), dispatcher = dispatcher_](const request& r, auto&& reply) {
+                const inline_timer timer{*dispatcher, r.task()};
+                const current_trace during{r.trace()};
+                timed(r, std::forward<decltype(reply)>(reply));
+            };
+        }
+    };
     if (task.info.inline_ok || task.coroutine) {
-        time_inline(task);
+        time_inline(task.plain);
+        time_inline(task.async);
     } else if (task.plain || task.async) {
         auto work = std::make_shared<const registration>(
             registration{.plain = std::exchange(task.plain, nullptr), .async = std::exchange(task.async, nullptr)});
@@ -38,23 +48,6 @@ void pooled_registrar::add(registration task) {
         };
     }
     host_.add(std::move(task));
-}
-
-void pooled_registrar::time_inline(registration& task) {
-    if (task.plain) {
-        task.plain = [handler = std::move(task.plain), dispatcher = dispatcher_](const request& r, json_writer& w) {
-            const inline_timer timed{*dispatcher, r.task()};
-            const current_trace during{r.trace()};
-            handler(r, w);
-        };
-    }
-    if (task.async) {
-        task.async = [handler = std::move(task.async), dispatcher = dispatcher_](const request& r, responder answer) {
-            const inline_timer timed{*dispatcher, r.task()};
-            const current_trace during{r.trace()};
-            handler(r, std::move(answer));
-        };
-    }
 }
 
 publisher pooled_registrar::make_publisher() { return host_.make_publisher(); }

@@ -26,8 +26,6 @@ class pooled_registrar final : public registrar {
     [[nodiscard]] publisher make_publisher() override;
 
   private:
-    void time_inline(registration& task);
-
     service& host_;
     std::shared_ptr<job_dispatcher> dispatcher_;
 };

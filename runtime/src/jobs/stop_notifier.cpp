@@ -37,17 +37,17 @@ struct stop_notifier::state : std::enable_shared_from_this<state> {
         return current->begun + std::max(patience / (1U << std::min<std::size_t>(blocked, 16)), min_patience);
     }
 
-    // With the lock. Adds a thread that makes calls, or replaces the one that does.
-    void add_thread() {
+    // With the lock. Adds a thread that makes calls, or replaces the one that does, if there may be one more.
+    bool add_thread() {
         if (ended || working >= max_threads) {
-            return;
+            return false;
         }
         try {
             if (threads.count() <= working) {
                 threads.add();
             }
         } catch (const std::system_error&) { // the existing threads have to suffice
-            return;
+            return false;
         }
         ++working;
         boost::asio::post(threads.get_executor(), [weak = weak_from_this()] {
@@ -55,18 +55,14 @@ struct stop_notifier::state : std::enable_shared_from_this<state> {
                 self->work();
             }
         });
+        return true;
     }
     // With the lock. Whether anything waits for the call that is running.
     [[nodiscard]] bool is_awaited() const { return !waiting.empty() || (ending && current != nullptr); }
     // With the lock. One thread makes the calls, and one watches whether it blocks.
     void ensure_threads() {
         const std::size_t wanted = blocked + (is_awaited() ? 1 : 0) + (current == nullptr ? 0 : 1);
-        while (working < wanted) {
-            const auto before = working;
-            add_thread();
-            if (working == before) {
-                return;
-            }
+        while (working < wanted && add_thread()) {
         }
     }
 

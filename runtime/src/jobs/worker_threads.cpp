@@ -28,7 +28,7 @@ worker_threads::worker_threads(std::size_t count) : state_(std::make_shared<stat
             add();
         }
     } catch (...) {
-        stop(std::chrono::milliseconds::max());
+        stop(std::chrono::milliseconds{0});
         throw;
     }
 }
@@ -63,13 +63,9 @@ std::size_t worker_threads::stop(std::chrono::milliseconds limit, std::size_t bu
         return 0;
     }
     const auto all_ended = [this] { return state_->running == 0; };
-    if (limit == std::chrono::milliseconds::max()) {
-        state_->one_ended.wait(lock, all_ended);
-    } else {
-        state_->one_ended.wait_for(lock, limit, all_ended);
-        // Idle threads take a moment too.
-        state_->one_ended.wait_for(lock, idle_stop_limit, [&] { return state_->running <= busy; });
-    }
+    state_->one_ended.wait_for(lock, limit, all_ended);
+    // Idle threads take a moment too.
+    state_->one_ended.wait_for(lock, idle_stop_limit, [&] { return state_->running <= busy; });
     const auto left = state_->running;
     lock.unlock();
     for (auto& thread : threads) {

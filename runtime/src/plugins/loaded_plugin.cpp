@@ -60,10 +60,12 @@ struct loaded_plugin::host_api {
         }
     }
     static void refuse(const cles_host* host, cles_text why) noexcept {
-        self(host).note_refusal({.why = std::string{view_of(why)}, .setting = std::nullopt});
+        self(host).note_refusal({.why = std::string{view_of(why)}});
     }
     static void refuse_setting(const cles_host* host, cles_text key, cles_text why) noexcept {
-        self(host).note_refusal({.why = std::string{view_of(why)}, .setting = std::string{view_of(key)}});
+        const std::string setting{view_of(key)}; // empty: all of them together
+        self(host).note_refusal(
+            {.why = std::string{view_of(why)}, .key = setting.empty() ? "config" : "config." + setting});
     }
     static void publish(const cles_host* host, cles_text noun, cles_text json) noexcept {
         auto& plugin = self(host);
@@ -110,7 +112,7 @@ struct loaded_plugin::host_api {
         return self(host).jobs_.stopped(job) ? 1 : 0;
     }
     static void on_stop(const cles_host* host, cles_job job, const cles_callback* callback) noexcept {
-        self(host).jobs_.on_stop(job, plugin_callback{callback->call, callback->drop, callback->user});
+        self(host).jobs_.on_stop(job, plugin_callback(callback->call, callback->drop, callback->user));
     }
     static void delegate(const cles_host* host, cles_job job, cles_text command, const cles_ask* ask) noexcept {
         self(host).delegate(job, view_of(command), known_part(ask));
@@ -172,26 +174,21 @@ template <class F>
 std::optional<loaded_plugin::refusal> loaded_plugin::run_guarded(const char* what, F&& call) {
     may_refuse_ = true;
     bool ok = false;
-    std::string thrown;
     try {
         ok = call() == 0;
     } catch (const std::exception& e) {
-        thrown = std::string{what} + " threw: " + e.what();
+        refusal_ = {.why = std::string{what} + " threw: " + e.what()};
     } catch (...) {
-        thrown = std::string{what} + " threw something that is not an exception";
+        refusal_ = {.why = std::string{what} + " threw something that is not an exception"};
     }
     may_refuse_ = false;
     if (ok) {
         return std::nullopt;
     }
-    if (!thrown.empty()) {
-        return refusal{.why = std::move(thrown), .setting = std::nullopt};
+    if (refusal_.why.empty()) {
+        refusal_.why = "it refuses to start without giving a reason";
     }
-    auto refused = refusal_;
-    if (refused.why.empty()) {
-        refused.why = "it refuses to start without giving a reason";
-    }
-    return refused;
+    return refusal_;
 }
 
 // The first one counts.
@@ -230,7 +227,7 @@ std::int32_t loaded_plugin::add_task(const cles_task& added) {
         return CLES_TOO_LATE;
     }
     const auto refuse = [&](std::int32_t code, std::string why) {
-        note_refusal({.why = std::move(why), .setting = std::nullopt});
+        note_refusal({.why = std::move(why)});
         return code;
     };
     const std::string name{view_of(added.name)};
@@ -284,20 +281,11 @@ void loaded_plugin::stop() noexcept {
 
 // -- tasks ---------------------------------------------------------------------------------------------------------
 
-void loaded_plugin::throw_refusal() const {
-    if (closed_) {
-        throw error(errc::unavailable, "the plugin '" + name_ + "' has stopped");
-    }
-    throw error(errc::busy, "too many jobs of plugins are running");
-}
-
 void loaded_plugin::run(task_handler handler, void* user, const request& what, const responder& answer) {
-    if (closed_) {
-        throw_refusal();
-    }
-    const auto job = jobs_.open(answer);
+    const auto job = closed_ ? plugin_jobs::id{0} : jobs_.open(answer);
     if (job == 0) {
-        throw_refusal();
+        throw closed_ ? error(errc::unavailable, "the plugin '" + name_ + "' has stopped")
+                      : error(errc::busy, "too many jobs of plugins are running");
     }
     if (!answer.is_thread_safe()) { // a pool tells its own jobs
         answer.on_stop([this, job] {

@@ -44,7 +44,7 @@ class loaded_plugin {
     using owner_lookup = std::function<std::optional<std::string>(cles::verb, std::string_view task)>;
     struct refusal {
         std::string why;
-        std::optional<std::string> setting; ///< the key of the invalid one; empty: all of them together
+        std::string key = "path"; ///< that is to blame, as in `plugin_error`
     };
     /// Lets the plugin check its settings, without starting it.
     std::optional<refusal> check(const std::string& config);
@@ -75,7 +75,6 @@ class loaded_plugin {
     template <class F>
     std::optional<refusal> run_guarded(const char* what, F&& call);
     void note_refusal(refusal what);
-    [[noreturn]] void throw_refusal() const;
     void run(task_handler handler, void* user, const request& what, const responder& answer);
     void call_handler(task_handler handler, void* user, const request& what, plugin_jobs::id job) const;
     void finish(plugin_jobs::id job, std::function<void(const responder&)> answer);

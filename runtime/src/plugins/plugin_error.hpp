@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -29,10 +28,5 @@ class plugin_error : public std::runtime_error {
     std::size_t path_size_;
     std::string key_;
 };
-
-/// The key of a setting of the plugin itself, if one is to blame; empty for all of them together.
-inline std::string key_of_setting(const std::optional<std::string>& setting) {
-    return !setting ? "path" : setting->empty() ? "config" : "config." + *setting;
-}
 
 } // namespace cles::runtime

@@ -9,25 +9,14 @@
 #include "plugins/plugin_trial.hpp"
 
 #include <algorithm>
-#include <condition_variable>
+#include <atomic>
+#include <future>
 #include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
 
 namespace cles::runtime {
-namespace {
-
-// Keeps the plugins of all hosts until the process ends, because a host cannot know whether a plugin is idle.
-template <class T>
-void keep_forever(T kept) {
-    static std::mutex mutex;
-    static auto* const all = new std::vector<T>;
-    const std::scoped_lock lock{mutex};
-    all->push_back(std::move(kept));
-}
-
-} // namespace
 
 struct plugin_host::state {
     plugin_jobs jobs;
@@ -35,23 +24,22 @@ struct plugin_host::state {
     std::vector<std::unique_ptr<loaded_plugin>> plugins;
     std::vector<std::shared_ptr<const boost::dll::shared_library>> libraries;
     std::vector<const cles_plugin*> descriptions; ///< of the loaded ones, to detect duplicates
-
-    // Used by the thread that stops them.
-    std::mutex mutex;
-    std::condition_variable changed;
-    bool all_stopped = false;
-    std::size_t callbacks_left = 0;
+    std::atomic<std::size_t> callbacks_left{0};   ///< set by the thread that stops them
 };
 
 plugin_host::plugin_host(plugin_host_options options)
     : options_(std::move(options)), state_(std::make_shared<state>()) {
-    keep_forever(state_);
+    // The plugins of all hosts are kept until the process ends, because a host cannot know whether a plugin is idle.
+    static std::mutex mutex;
+    static auto* const all = new std::vector<std::shared_ptr<state>>;
+    const std::scoped_lock lock{mutex};
+    all->push_back(state_);
 }
 
 plugin_host::~plugin_host() { stop(std::chrono::seconds{2}); }
 
 void plugin_host::load(const std::string& path, const std::string& config, registrar& into, const std::string& sha256) {
-    const plugin_file file{path, find_plugin(path, options_.folders), options_.rules, sha256};
+    const plugin_file file{path, find_plugin(path, options_.rules.folders), options_.rules, sha256};
     if (options_.trial.count() > 0) {
         try_plugin(path, file, options_.node, config, options_.trial);
     }
@@ -77,7 +65,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
         return std::nullopt;
     };
     if (const auto refused = plugin.start(config, into.make_publisher(), owner_of)) {
-        throw plugin_error(path, refused->why, key_of_setting(refused->setting));
+        throw plugin_error(path, refused->why, refused->key);
     }
     plugin_info info{.path = path, .name = plugin.name(), .version = plugin.version()};
     try {
@@ -108,27 +96,20 @@ plugin_stop_report plugin_host::stop(std::chrono::milliseconds limit) {
     auto callbacks =
         state_->jobs.close([&](const responder& to) { to.fail(errc::unavailable, options_.node + " has stopped"); });
     for (auto& callback : callbacks) {
-        if (callback) {
-            state_->notifier.notify({.callback = std::move(callback)});
-        }
+        state_->notifier.notify({.callback = std::move(callback)});
     }
     // On a thread of its own, because a plugin may take long, or never return.
-    std::thread{[state = state_, limit] {
-        const auto left_behind =
-            state->notifier.close(limit / 2); // a callback that blocks must not prevent the plugins from stopping
-        {
-            const std::scoped_lock lock{state->mutex};
-            state->callbacks_left = left_behind;
-        }
+    std::promise<void> all_stopped;
+    const auto end = all_stopped.get_future();
+    std::thread{[state = state_, limit, all_stopped = std::move(all_stopped)]() mutable {
+        // A callback that blocks must not prevent the plugins from stopping.
+        state->callbacks_left = state->notifier.close(limit / 2);
         for (auto left = state->plugins.size(); left > 0; --left) {
             state->plugins[left - 1]->stop();
         }
-        const std::scoped_lock lock{state->mutex};
-        state->all_stopped = true;
-        state->changed.notify_all();
+        all_stopped.set_value();
     }}.detach();
-    std::unique_lock lock{state_->mutex};
-    state_->changed.wait_for(lock, limit, [this] { return state_->all_stopped; });
+    end.wait_for(limit);
     plugin_stop_report report{.callbacks = state_->callbacks_left};
     for (const auto& plugin : state_->plugins) {
         if (!plugin->has_stopped()) {

@@ -13,7 +13,6 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -21,13 +20,12 @@
 namespace cles::runtime {
 
 struct plugin_host_options {
-    std::string node;                           ///< this node's name
-    std::vector<std::filesystem::path> folders; ///< where to search for plugins named without one
-    plugin_log log{};                           ///< called until `plugin_host::stop` returns
+    std::string node;     ///< this node's name
+    plugin_rules rules{}; ///< which files may be loaded; plugins named without a folder are searched for in its folders
+    plugin_log log{};     ///< called until `plugin_host::stop` returns
     /// How long a library may take to load in a child process that tries it first, so that a crash or a hang there does
     /// no harm. 0: it is not tried.
     std::chrono::milliseconds trial{10'000};
-    plugin_rules rules{}; ///< which files may be loaded
 };
 
 struct plugin_info {

@@ -6,6 +6,7 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/post.hpp>
 
+#include <memory>
 #include <string>
 
 namespace cles::runtime {
@@ -34,12 +35,11 @@ void call_plugin(void (*function)(Parameters...), Arguments... arguments) noexce
 
 // -- callbacks -----------------------------------------------------------------------------------------------------
 
-plugin_callback::state::~state() { call_plugin(drop, user); }
-
-void plugin_callback::operator()() const {
-    if (state_) {
-        call_plugin(state_->call.exchange(nullptr), state_->user);
-    }
+std::function<void()> plugin_callback(void (*call)(void*), void (*drop)(void*), void* user) {
+    const std::shared_ptr<void> kept{user, [drop](void* dropped) { call_plugin(drop, dropped); }};
+    return [kept, left = std::make_shared<std::atomic<decltype(call)>>(call)] {
+        call_plugin(left->exchange(nullptr), kept.get());
+    };
 }
 
 // -- handles -------------------------------------------------------------------------------------------------------
@@ -86,7 +86,7 @@ void plugin_jobs::started(id job) {
 
 plugin_jobs::slot plugin_jobs::release(id job) {
     auto* s = find(job);
-    slot out{.answer = std::exchange(s->answer, std::nullopt), .on_stop = std::move(s->on_stop)};
+    slot out{.answer = std::exchange(s->answer, std::nullopt), .on_stop = std::exchange(s->on_stop, nullptr)};
     free_.push_back(static_cast<std::uint32_t>(job & 0xFFFFFFFFU));
     --open_;
     return out;
@@ -148,8 +148,8 @@ bool plugin_jobs::stopped(id job) {
     return s == nullptr || s->stopped || (s->thread_safe && s->answer->stopped());
 }
 
-void plugin_jobs::on_stop(id job, plugin_callback callback) {
-    plugin_callback replaced; // destroyed without the lock
+void plugin_jobs::on_stop(id job, std::function<void()> callback) {
+    std::function<void()> replaced; // destroyed without the lock
     std::optional<responder> by;
     {
         const std::scoped_lock lock{mutex_};
@@ -168,13 +168,13 @@ void plugin_jobs::on_stop(id job, plugin_callback callback) {
         }
     }
     if (by) {
-        by->on_stop([callback] { callback(); });
-    } else {
+        by->on_stop(callback);
+    } else if (callback) {
         callback();
     }
 }
 
-plugin_callback plugin_jobs::stop(id job) {
+std::function<void()> plugin_jobs::stop(id job) {
     const std::scoped_lock lock{mutex_};
     auto* s = find(job);
     if (s == nullptr) {
@@ -186,7 +186,7 @@ plugin_callback plugin_jobs::stop(id job) {
 
 // -- close ---------------------------------------------------------------------------------------------------------
 
-std::vector<plugin_callback> plugin_jobs::close(const std::function<void(const responder&)>& answer) {
+std::vector<std::function<void()>> plugin_jobs::close(const std::function<void(const responder&)>& answer) {
     std::vector<slot> gone;
     {
         const std::scoped_lock lock{mutex_};
@@ -197,10 +197,12 @@ std::vector<plugin_callback> plugin_jobs::close(const std::function<void(const r
             }
         }
     }
-    std::vector<plugin_callback> callbacks;
+    std::vector<std::function<void()>> callbacks;
     for (auto& s : gone) {
         answer(*s.answer);
-        callbacks.push_back(std::move(s.on_stop));
+        if (s.on_stop) {
+            callbacks.push_back(std::move(s.on_stop));
+        }
     }
     return callbacks;
 }

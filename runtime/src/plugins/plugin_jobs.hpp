@@ -9,10 +9,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <mutex>
 #include <optional>
-#include <string>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -20,30 +18,8 @@
 
 namespace cles::runtime {
 
-/// A callback of a plugin: called by one of its holders at most, and dropped by the last.
-class plugin_callback {
-  public:
-    using function = void (*)(void*);
-
-    plugin_callback() = default;
-    plugin_callback(function call, function drop, void* user) : state_(std::make_shared<state>(call, drop, user)) {}
-
-    void operator()() const;
-    [[nodiscard]] explicit operator bool() const noexcept { return state_ != nullptr; }
-
-  private:
-    struct state {
-        state(function c, function d, void* u) noexcept : call(c), drop(d), user(u) {}
-        state(const state&) = delete;
-        state& operator=(const state&) = delete;
-        ~state();
-
-        std::atomic<function> call; ///< null once it has been called
-        function drop;
-        void* user;
-    };
-    std::shared_ptr<state> state_;
-};
+/// A callback of a plugin, whose copies call it once at most. The last copy drops it.
+std::function<void()> plugin_callback(void (*call)(void*), void (*drop)(void*), void* user);
 
 /// The open jobs of plugins, by their handles.
 ///
@@ -76,13 +52,13 @@ class plugin_jobs {
     /// Whether its requester does not wait for it any more.
     [[nodiscard]] bool stopped(id job);
     /// Calls back when the job is stopped; at once if it has been.
-    void on_stop(id job, plugin_callback callback);
+    void on_stop(id job, std::function<void()> callback);
     /// An inline job is stopped. Returns its `on_stop` callback, to be called on a thread where it may take long.
-    [[nodiscard]] plugin_callback stop(id job);
+    [[nodiscard]] std::function<void()> stop(id job);
 
     /// Ends all jobs with `answer`, and accepts no more. Returns their `on_stop` callbacks, to be called on a thread
     /// where they may take long. Nothing is posted after it returns.
-    std::vector<plugin_callback> close(const std::function<void(const responder&)>& answer);
+    std::vector<std::function<void()>> close(const std::function<void(const responder&)>& answer);
 
     [[nodiscard]] std::size_t size() const;
     /// How many answers were for jobs that do not exist (any more).
@@ -95,7 +71,7 @@ class plugin_jobs {
         bool thread_safe = false; ///< any thread may use the responder
         std::thread::id starting_thread{};
         std::optional<responder> answer{};
-        plugin_callback on_stop{};
+        std::function<void()> on_stop{};
     };
     [[nodiscard]] slot* find(id job) noexcept;
     [[nodiscard]] static bool is_direct(const slot& s) noexcept {

@@ -95,7 +95,7 @@ void reset_process_state(pid_t parent, int output) {
         stop_notifier notifier;
         loaded_plugin plugin{detail::known_part(&described), node, jobs, notifier, {}};
         if (const auto why = plugin.check(config)) {
-            throw plugin_error("", why->why, key_of_setting(why->setting));
+            throw plugin_error("", why->why, why->key);
         }
         ::_exit(usable);
     } catch (const plugin_error& e) {

@@ -11,13 +11,12 @@ using namespace cles::runtime;
 using cles::verb;
 
 BOOST_AUTO_TEST_CASE(a_request_is_a_line_of_the_language) {
-    std::string text;
-    wire_line_writer{text, verb::delegate, "plan"}
-        .parameter("home base")
-        .parameter(std::uint64_t{7})
-        .adverb("id", std::int64_t{17})
-        .adverb("address", "unix:///run/a b")
-        .body(R"({"x":1})");
+    auto text = wire_line_writer{verb::delegate, "plan"}
+                    .parameter("home base")
+                    .parameter(std::uint64_t{7})
+                    .adverb("id", std::int64_t{17})
+                    .adverb("address", "unix:///run/a b")
+                    .body(R"({"x":1})");
     BOOST_TEST(text == "DELEGATE self:plan/home%20base/7 id=17 address=unix%3A%2F%2F%2Frun%2Fa%20b {\"x\":1}\n");
     text.pop_back();
     const auto read = read_wire_line(text);
@@ -42,8 +41,7 @@ BOOST_AUTO_TEST_CASE(any_bytes_survive_in_parameters_and_adverbs) {
     for (int i = 1; i < 256; ++i) {
         bytes.push_back(static_cast<char>(i));
     }
-    std::string text;
-    wire_line_writer{text, verb::pull, "t"}.parameter(bytes).adverb("key", bytes).body("{}");
+    auto text = wire_line_writer{verb::pull, "t"}.parameter(bytes).adverb("key", bytes).body("{}");
     BOOST_TEST(text.find('\n') == text.size() - 1);
     text.pop_back();
     const auto read = read_wire_line(text);
@@ -53,8 +51,7 @@ BOOST_AUTO_TEST_CASE(any_bytes_survive_in_parameters_and_adverbs) {
 }
 
 BOOST_AUTO_TEST_CASE(replies_with_and_without_adverbs) {
-    std::string text;
-    wire_line_writer{text, 9}.adverb("progress", "0.5").body("[1]");
+    const auto text = wire_line_writer{9}.adverb("progress", "0.5").body("[1]");
     BOOST_TEST(text == "id=9 progress=0.5 [1]\n");
     const auto read = read_wire_line("id=9 progress=0.5 [1]");
     BOOST_REQUIRE(read);
@@ -84,17 +81,17 @@ BOOST_AUTO_TEST_CASE(bodies_of_replies) {
 BOOST_AUTO_TEST_CASE(failures) {
     BOOST_TEST(!read_failure("{}"));
     BOOST_TEST(!read_failure(R"({"a":1})"));
-    const auto busy = read_failure(failure_body("busy", "a \"full\" dock", 250));
+    const auto busy = read_failure(failure_body({"busy", "a \"full\" dock", 250}));
     BOOST_REQUIRE(busy);
-    BOOST_TEST(busy->code == "busy");
+    BOOST_TEST(busy->error == "busy");
     BOOST_TEST(busy->message == "a \"full\" dock");
     BOOST_TEST(busy->retry_ms.value() == 250);
-    BOOST_TEST(!read_failure(failure_body("failed", "x", std::nullopt))->retry_ms);
+    BOOST_TEST(!read_failure(failure_body({"failed", "x"}))->retry_ms);
     for (const std::string bad :
          {R"({"error":7})", R"({"error":"busy","retry_ms":"x"})", R"({"error":"busy")", R"({"error":"busy"} x)"}) {
         const auto read = read_failure(bad);
         BOOST_REQUIRE(read);
-        BOOST_TEST(read->code == "failed");
+        BOOST_TEST(read->error == "failed");
     }
     BOOST_TEST(read_failure(R"({"error":"busy","retry_ms":-5})")->retry_ms.value() == 0);
 }

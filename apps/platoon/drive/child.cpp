@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "platoon/drive/child.hpp"
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace platoon {
+namespace {
+
+[[noreturn]] void fail(const char* what) { throw std::system_error(errno, std::generic_category(), what); }
+
+// Between fork and exec: nothing but system calls.
+[[noreturn]] void exec_child(std::vector<char*>& words, int out, int err, pid_t parent) {
+    ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (::getppid() != parent) {
+        ::_exit(127); // the parent has ended meanwhile
+    }
+    const int nothing = ::open("/dev/null", O_RDONLY);
+    ::dup2(nothing, STDIN_FILENO);
+    ::dup2(out, STDOUT_FILENO);
+    ::dup2(err, STDERR_FILENO);
+    ::setpgid(0, 0); // a terminal sends SIGINT to the whole group, but the parent stops its children itself
+    ::execv("/proc/self/exe", words.data());
+    ::_exit(127);
+}
+
+} // namespace
+
+child::child(const std::vector<std::string>& arguments) {
+    out_ = ::memfd_create("output", MFD_CLOEXEC);
+    err_ = ::memfd_create("errors", MFD_CLOEXEC);
+    if (out_ < 0 || err_ < 0) {
+        fail("a vehicle's output");
+    }
+    std::vector<std::string> owned{"cles-platoon"};
+    owned.insert(owned.end(), arguments.begin(), arguments.end());
+    std::vector<char*> words;
+    words.reserve(owned.size() + 1);
+    for (auto& word : owned) {
+        words.push_back(word.data());
+    }
+    words.push_back(nullptr);
+    const pid_t parent = ::getpid();
+    pid_ = ::fork();
+    if (pid_ < 0) {
+        fail("a vehicle's process");
+    }
+    if (pid_ == 0) {
+        exec_child(words, out_, err_, parent);
+    }
+}
+
+child::child(child&& other) noexcept
+    : pid_(std::exchange(other.pid_, -1)), ended_(other.ended_), status_(other.status_),
+      out_(std::exchange(other.out_, -1)), err_(std::exchange(other.err_, -1)) {}
+
+child::~child() {
+    if (running()) {
+        signal(SIGKILL);
+        ::waitpid(pid_, &status_, 0);
+    }
+    for (const int file : {out_, err_}) {
+        if (file >= 0) {
+            ::close(file);
+        }
+    }
+}
+
+bool child::running() {
+    if (pid_ > 0 && !ended_) {
+        ended_ = ::waitpid(pid_, &status_, WNOHANG) == pid_;
+    }
+    return pid_ > 0 && !ended_;
+}
+
+void child::signal(int number) const {
+    if (pid_ > 0 && !ended_) {
+        ::kill(pid_, number);
+    }
+}
+
+std::string child::read(int file) {
+    std::string text;
+    std::array<char, 65536> part{};
+    for (ssize_t got = 0; (got = ::pread(file, part.data(), part.size(), static_cast<off_t>(text.size()))) > 0;) {
+        text.append(part.data(), static_cast<std::size_t>(got));
+    }
+    return text;
+}
+
+} // namespace platoon

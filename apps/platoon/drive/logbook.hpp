@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "platoon/driver/motion.hpp"
+#include "platoon/driver/state.hpp"
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace platoon {
+
+/// The updates of each vehicle during a drive, and therefore its position at any time.
+class logbook {
+  public:
+    void add(const std::string& vehicle, const state& told);
+    /// Its process has ended. \param left as planned: it is no longer on the lane; otherwise it stays there, and brakes
+    void record_end(const std::string& vehicle, bool left);
+    /// Nothing before its first update, while it is in the next lane, and after it has left.
+    [[nodiscard]] std::optional<motion> position(const std::string& vehicle, double t) const;
+    /// Its last update, or null.
+    [[nodiscard]] const state* last(const std::string& vehicle) const;
+    [[nodiscard]] bool has_ended(const std::string& vehicle) const { return ended_.contains(vehicle); }
+    [[nodiscard]] bool has_left(const std::string& vehicle) const;
+
+  private:
+    std::map<std::string, std::vector<state>> states_; ///< of each, in the order of time
+    std::map<std::string, bool> ended_;                ///< whether by leaving
+};
+
+} // namespace platoon

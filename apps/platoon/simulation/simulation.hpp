@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "platoon/driver/driver.hpp"
+#include "platoon/simulation/assessment.hpp"
+#include "platoon/simulation/impairment.hpp"
+#include "platoon/simulation/incident.hpp"
+
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace platoon {
+
+/// How often a vehicle decides between two of its updates, so that it does so at least 100 times a second.
+unsigned decisions_per_update(double hz);
+/// After how many decisions the radar measures.
+unsigned decisions_per_echo(const radar_setup& radar, double hz);
+/// The offset in a period at which vehicle i of n sends, so that not all send at once.
+double send_offset(std::size_t i, std::size_t n, double hz);
+/// Vehicle i's name.
+std::string name_of(std::size_t i);
+/// The losses on a link. \param loss the share \param burst the mean number of updates of a burst; 0: independent
+gilbert_elliott losses_of(double loss, double burst);
+
+/// Between which limits the vehicles of a platoon differ, each limit evenly distributed.
+struct spread {
+    double least_lag = vehicle_limits{}.lag, most_lag = vehicle_limits{}.lag;         ///< s
+    double least_brake = vehicle_limits{}.brake, most_brake = vehicle_limits{}.brake; ///< m/s²
+};
+/// Those of each vehicle, determined by a seed.
+std::vector<vehicle_limits> limits_of(std::size_t vehicles, const spread& how, const vehicle_limits& same,
+                                      std::uint64_t seed);
+/// Where each is at time 0.
+std::vector<motion> start_positions(const std::vector<vehicle_limits>& vehicles, double spacing, double speed);
+
+struct scenario {
+    std::size_t vehicles = 20;
+    double seconds = 0; ///< 0: until five seconds after the manoeuvre
+    gilbert_elliott losses{};
+    double delay = 0; ///< s, the maximum delay of an update; the minimum is half of it
+    std::uint64_t seed = 1;
+    std::vector<incident> incidents{};
+    spread differences{};
+    driver_setup setup{}; ///< of each vehicle, without name, position and predecessor
+    /// Called when a vehicle changes its mode.
+    std::function<void(double now, const std::string& vehicle, role mode, const std::string& why)> on_change{};
+};
+
+/// A vehicle at a moment of the simulation.
+struct sighting {
+    motion where{};
+    double desired = 0;  ///< distance to the one ahead, front to front, m
+    double distance = 0; ///< to the one ahead in the lane; NaN: there is none
+    bool in_lane = true;
+};
+
+/// The motion at `t` of a vehicle that has had no driver since this state: it keeps braking, and starts to brake if it
+/// did not.
+motion without_driver(const state& last, double t);
+
+/// A platoon in virtual time. \param watch is called a hundred times per second with all vehicles; those that join are
+/// added at the end
+verdict simulate(const scenario& what, const std::function<void(double now, const std::vector<sighting>&)>& watch = {});
+
+} // namespace platoon

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "daemon/service_parts.hpp"
+
+#include <cles/error.hpp>
+#include <cles/federation.hpp>
+
+#include "config/config.hpp"
+
+#ifdef CLES_WITH_SECURITY
+#include <cles/security.hpp>
+#include <cles/security/core_dumps.hpp>
+#include <cles/security/node_files.hpp>
+
+#include <charconv>
+#include <cstdint>
+#include <exception>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <pwd.h>
+#include <unistd.h>
+#endif
+
+namespace cles::runtime {
+
+#ifdef CLES_WITH_SECURITY
+
+namespace {
+
+// By name, or by number.
+std::optional<std::uint32_t> id_of_user(const std::string& user) {
+    std::uint32_t number = 0;
+    const auto [end, wrong] = std::from_chars(user.data(), user.data() + user.size(), number);
+    if (wrong == std::errc{} && end == user.data() + user.size()) {
+        return number;
+    }
+    constexpr std::size_t enough = 16'384;
+    std::vector<char> space(enough);
+    passwd entry{};
+    passwd* found = nullptr;
+    if (::getpwnam_r(user.c_str(), &entry, space.data(), space.size(), &found) != 0 || found == nullptr) {
+        return {};
+    }
+    return entry.pw_uid;
+}
+
+} // namespace
+
+detail::service_part security_of(const config& setup) {
+    if (!setup.security.is_on()) {
+        return {};
+    }
+    security::forbid_core_dumps();
+    security_options options{.directory = setup.security.keys};
+    for (const auto& [user, member] : setup.security.local_users) {
+        const auto id = id_of_user(user);
+        if (!id) {
+            throw config_error(setup.location_of("security.local_users." + user), "there is no user '" + user + "'");
+        }
+        options.local_users.emplace(*id, member);
+    }
+    try {
+        auto made = secured(std::move(options));
+        if (const auto name = name_of_key(setup.security.keys); name != setup.node) {
+            throw config_error(setup.location_of("node"), "'" + setup.node + "' is not the name of the key in " +
+                                                              setup.security.keys + ", which is '" + name +
+                                                              "'; without 'node', the node has that name");
+        }
+        return made;
+    } catch (const error& e) {
+        throw config_error(setup.location_of("security"), e.message());
+    }
+}
+
+std::string name_of_key(const std::string& directory) {
+    try {
+        security::forbid_core_dumps();
+        return security::describe_node(directory).name;
+    } catch (const std::exception&) { // reported when the security is made
+        return {};
+    }
+}
+
+#else
+
+detail::service_part security_of(const config& setup) {
+    if (setup.security.is_on()) {
+        throw config_error(setup.location_of("security"), "this clesd was built without security");
+    }
+    return {};
+}
+
+std::string name_of_key(const std::string& /*directory*/) { return {}; }
+
+#endif
+
+detail::service_part federation_of(const config& setup) {
+    const auto& wanted = setup.federation;
+    if (!wanted.is_on()) {
+        return nullptr;
+    }
+#ifdef CLES_WITH_FEDERATION
+    try {
+        return federation({.servers = wanted.servers,
+                           .pool = wanted.pool,
+                           .credentials = wanted.credentials,
+                           .token = wanted.token,
+                           .tls_authority = wanted.tls_authority,
+                           .tls_certificate = wanted.tls_certificate,
+                           .tls_key = wanted.tls_key});
+    } catch (const error& e) {
+        throw config_error(setup.location_of("federation"), e.message());
+    }
+#else
+    throw config_error(setup.location_of("federation"), "this clesd was built without federation");
+#endif
+}
+
+} // namespace cles::runtime
