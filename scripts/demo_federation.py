@@ -10,14 +10,12 @@ or files are left behind.
 """
 
 import json
-import os
-import re
-import shutil
 import subprocess
 import sys
 import time
 
 from demo_cluster import PATIENCE, Cluster, Link, Trouble, heading, patient, run, show
+from nats_server import PROGRAM, NatsServer
 
 HUB, GATE, INNER = "hub", "gate", "car1"
 CONFIG = """\
@@ -33,30 +31,16 @@ plugins: [{plugins}]
 class TwoPools(Cluster):
     """hub is the only node of south; gate and car1 are of north. hub and gate are bridges."""
 
-    def __init__(self, programs, server):
-        super().__init__(programs)
-        self.server_program = server  # a whole path
-        self.server = None
-        self.port = -1  # any
+    server = None
 
     def start_server(self):
-        with open(self.file("nats.log"), "w", encoding="utf-8"):
-            pass
-        self.server = self.begin(self.server_program, "-a", "127.0.0.1", "-p", str(self.port), "-l", self.file("nats.log"))
-
-        def port():
-            with open(self.file("nats.log"), encoding="utf-8") as log:
-                text = log.read()
-            return "Server is ready" in text and re.search(r"client connections on 127\.0\.0\.1:(\d+)", text)
-
-        self.port = int(patient(port, "nats-server is ready")[1])
-
-    def stop_server(self):
-        self.server.kill()
-        self.server.wait()
+        if self.server is None:
+            self.server = NatsServer(self.folder, begin=self.begin)
+        else:
+            self.server.start()
 
     def config_of(self, name):
-        bridge = f"insecure: true\nfederation: {{nats: 'nats://127.0.0.1:{self.port}', pool: %s}}"
+        bridge = f"insecure: true\nfederation: {{nats: '{self.server.url}', pool: %s}}"
         place = {HUB: bridge % "south", GATE: bridge % "north",
                  INNER: f"pool: north\nseeds: ['{self.urls.get(GATE, '')}']"}[name]
         return CONFIG.format(name=name, place=place, plugins="libcles-system.so" if name == HUB else
@@ -97,7 +81,7 @@ def show_demo(pools):
         show(run_cles(pools, "ls", "--pools", "-o", "table"))
 
         heading("kill -9 for nats-server")
-        pools.stop_server()
+        pools.server.stop()
         patient(lambda: link.ask(f"PULL north.{INNER}:prime/97").get("error") == "unavailable", "the loss is noticed")
         answer = ask(link, f"PULL north.{INNER}:prime/97")
         answer = ask(link, f"PULL {HUB}:prime/97")
@@ -118,12 +102,11 @@ def run_cles(pools, *arguments):
 
 
 def main():
-    server = shutil.which("nats-server") or shutil.which("nats-server", path="/usr/sbin:/usr/local/sbin")
-    if server is None:
+    if PROGRAM is None:
         heading("Two pools, joined by nats-server")
         show("nats-server is not installed, so this part is left out: scripts/setup installs it.")
         return 0
-    return run(show_demo, TwoPools(sys.argv[1] if len(sys.argv) > 1 else "build/release/apps", server))
+    return run(show_demo, TwoPools(sys.argv[1] if len(sys.argv) > 1 else "build/release/apps"))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,8 @@ import sys
 import time
 from pathlib import Path
 
-from nats_server import MISSING, PROGRAM, NatsServer
+from measured_server import MeasuredServer
+from nats_server import MISSING, PROGRAM
 
 POOLS = {"north": ("n0", "n1"), "south": ("s0", "s1")}
 DEADLINE = 2.0  # seconds, of requests
@@ -165,7 +166,7 @@ class Fleet:
             begun = time.monotonic()
             victim = rng.choice([*self.nodes, *self.nodes, None])
             if victim is None:
-                self.server.kill()
+                self.server.stop()
                 await asyncio.sleep(rng.uniform(0.05, 0.6))
                 await asyncio.to_thread(self.server.start)
             else:
@@ -216,7 +217,7 @@ def main(program, faults="50", seconds="80", seed="1"):
     if PROGRAM is None:
         print(MISSING, file=sys.stderr)
         return 77
-    with NatsServer() as server:
+    with MeasuredServer() as server:
         fleet = Fleet(program, server, server.folder.name)
         whole = asyncio.run(fleet.run_and_end(int(faults), float(seconds), int(seed)))
         effects = collections.Counter(line.split()[0] for line in fleet.marks.read_text(encoding="utf-8").splitlines())

@@ -15,7 +15,8 @@ import time
 from pathlib import Path
 
 import faults
-from nats_server import MISSING, PROGRAM, NatsServer
+from measured_server import MeasuredServer
+from nats_server import MISSING, PROGRAM
 
 IDLE = 10.0  # seconds, for which traffic is counted
 
@@ -43,7 +44,7 @@ def make_fleet(cles, fleet, bridges):
 
 
 def measure_cost(folder, report):
-    with NatsServer() as server, tempfile.TemporaryDirectory() as place:
+    with MeasuredServer() as server, tempfile.TemporaryDirectory() as place:
         fleet = make_fleet(folder / "../../apps/cles", Path(place) / "fleet", ("gate", "hub"))
         done = subprocess.run([folder / "cles_federation_cost", server.url, fleet], stdout=subprocess.PIPE, text=True, check=True)
     found = json.loads(done.stdout)
@@ -64,7 +65,7 @@ def measure_cost(folder, report):
 
 
 def measure_pools(folder, report):
-    with NatsServer() as server, subprocess.Popen([folder / "cles_federation_pools", server.url], stdin=subprocess.PIPE,
+    with MeasuredServer() as server, subprocess.Popen([folder / "cles_federation_pools", server.url], stdin=subprocess.PIPE,
                                                   stdout=subprocess.PIPE, text=True) as running:
         found = json.loads(running.stdout.readline())
         before = server.counted()

@@ -201,7 +201,7 @@ BOOST_FIXTURE_TEST_CASE(what_a_lost_bridge_took_is_unavailable, two_pools) {
 
 BOOST_FIXTURE_TEST_CASE(the_last_bridge_of_a_pool_takes_the_link_with_it, two_pools) {
     gate.core().leave(nats.now());
-    gate.core().say_left();
+    gate.core().say_left(nats.now());
     nats.run_for(10ms);
     BOOST_TEST(!hub.core().is_live("north"));
     BOOST_TEST(count(hub.lost, "pool north") == 1U);
@@ -215,7 +215,7 @@ BOOST_FIXTURE_TEST_CASE(a_bridge_that_leaves_completes_what_it_has_taken, two_po
     BOOST_TEST(!gate.subscribes("cles.north.push.car9.echo", true));
     nats.run_for(6s);
     BOOST_TEST(hub.answer(id) == "{\"n\":1}");
-    gate.core().say_left();
+    gate.core().say_left(nats.now());
     nats.run_for(10ms);
     BOOST_TEST(!hub.core().is_live("north"));
 }

@@ -132,7 +132,7 @@ void site::connect() {
 
 void site::disconnect() {
     connection_ = 0;
-    bridge_->on_disconnected("the server has ended");
+    bridge_->on_disconnected("the server has ended", nats_.now());
 }
 
 void site::tick() {
@@ -180,35 +180,20 @@ void site::update(const std::string& noun, std::uint64_t seq) {
 }
 
 void site::receive(const std::string& subject, const std::string& reply, const std::string& message) {
+    const received_message received{subject, reply, message, nats_.now()};
     if (channel_) {
-        open(subject, reply, message);
+        channel_->receive(received, *bridge_);
+        for (const auto& each : channel_->take_questions()) {
+            nats_.publish(each.subject, channel_->questions(), each.message);
+        }
     } else {
-        bridge_->on_message(subject, reply, message, nats_.now());
+        bridge_->on_message(received);
     }
     for (const auto& [on, line] : std::exchange(delivered_, {})) {
         serve(on, line);
     }
     bridge_->on_batch();
     tick();
-}
-
-void site::open(const std::string& subject, const std::string& reply, const std::string& message) {
-    using outcome = sealed_channel::outcome;
-    const auto found = channel_->receive(subject, reply, message, nats_.now());
-    switch (found.what) {
-    case outcome::opened:
-        bridge_->on_message(subject, reply, found.message, nats_.now(), {found.sender, found.instance});
-        break;
-    case outcome::unproven: bridge_->on_unproven(subject, reply, nats_.now()); break;
-    case outcome::refused: bridge_->on_refused(subject, found.why, nats_.now()); break;
-    case outcome::consumed: break;
-    }
-    if (found.heartbeat_soon) {
-        bridge_->announce_soon(nats_.now());
-    }
-    for (const auto& each : channel_->take_questions()) {
-        nats_.publish(each.subject, each.reply, each.message);
-    }
 }
 
 void site::change_security() {

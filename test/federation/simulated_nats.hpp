@@ -146,7 +146,6 @@ class site final : public bridge_output, private bridge_trust {
     void on_lost(const bridge_id& gone) override { channel_->forget(gone); }
     void on_stated_roster(const bridge_id& by, std::uint32_t version) override;
 
-    void open(const std::string& subject, const std::string& reply, const std::string& message);
     void serve(const bridge_link& on, const std::string& line);
     void reply(const bridge_link& on, std::uint64_t id, const std::string& rest);
     void tick();

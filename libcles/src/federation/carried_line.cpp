@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "federation/carried_line.hpp"
 
+#include "federation/subject.hpp"
 #include "protocol/grammar.hpp"
+#include "protocol/reply_line.hpp"
 
 #include <algorithm>
-#include <optional>
 
 namespace cles::bridging {
 namespace {
 
 // Ends the entry of `via` for a pool that the request comes from.
 constexpr std::string_view crossed = ".nats";
+constexpr std::string_view taken_key = "taken=";
+constexpr std::string_view cancel_path = "cles/cancel/";
 
 // Appends the adverbs, without `id`, and the body. \param home of the names in `via`; nothing: `via` is left out
 // \param deadline_ms instead of the request's; 0: that one
@@ -65,8 +68,12 @@ std::string message_within_pool(const protocol::request_line& request, std::uint
 
 std::string line_of(const protocol::request_line& request, std::uint64_t id, std::string_view from) {
     std::string made{to_string(request.verb)};
-    made.append(" ").append(request.noun.target).append(":").append(request.noun.path);
-    made.append(" id=").append(std::to_string(id)).append(" via=").append(via_of(request, from));
+    made.append(" ")
+        .append(noun_of(request))
+        .append(" id=")
+        .append(std::to_string(id))
+        .append(" via=")
+        .append(via_of(request, from));
     append_rest(made, request, {});
     return made;
 }
@@ -92,6 +99,10 @@ std::string text_of(verb how, std::string_view node, std::string_view task, std:
     return made.append(message);
 }
 
+std::string noun_of(const protocol::request_line& request) {
+    return std::string{request.noun.target}.append(":").append(request.noun.path);
+}
+
 bool has_passed(std::string_view via, std::string_view pool) noexcept {
     return protocol::any_in_via(via, [pool](std::string_view node) {
         return node.size() > pool.size() && node.starts_with(pool) && node[pool.size()] == '.';
@@ -111,6 +122,38 @@ reply_parts split_reply(std::string_view line) noexcept {
     }
     line.remove_prefix(space + 1);
     return {.id = *id, .rest = line, .is_interim = line.starts_with("progress=")};
+}
+
+std::string reply_line(std::uint64_t id, std::string_view rest) {
+    std::string line;
+    protocol::append_reply_head(line, id);
+    return line.append(rest);
+}
+
+std::string taken_text(std::string_view instance) { return std::string{taken_key}.append(instance); }
+
+std::string_view take_taker(std::string_view& message) noexcept {
+    if (!message.starts_with(taken_key)) {
+        return {};
+    }
+    const auto end = std::min(message.find(' '), message.size());
+    const auto instance = message.substr(taken_key.size(), end - taken_key.size());
+    if (!is_instance(instance)) {
+        return {};
+    }
+    message.remove_prefix(std::min(end + 1, message.size()));
+    return instance;
+}
+
+std::string cancel_line(std::uint64_t number) {
+    return std::string{"PUSH self:"}.append(cancel_path).append(std::to_string(number));
+}
+
+std::optional<std::uint64_t> cancelled_number(const protocol::request_line& request) noexcept {
+    const auto path = request.noun.path;
+    return path.starts_with(cancel_path)
+               ? std::optional{protocol::parse_number(path.substr(cancel_path.size())).value_or(0)}
+               : std::nullopt;
 }
 
 } // namespace cles::bridging

@@ -6,6 +6,7 @@
 #include "protocol/request_line.hpp"
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -35,6 +36,9 @@ bool has_crossed(std::string_view via) noexcept;
 /// for the node.
 std::string text_of(verb how, std::string_view node, std::string_view task, std::string_view message);
 
+/// "car1:localization/fast"
+std::string noun_of(const protocol::request_line& request);
+
 /// Whether the request has been in that pool.
 bool has_passed(std::string_view via, std::string_view pool) noexcept;
 
@@ -45,5 +49,19 @@ struct reply_parts {
     bool is_interim = false; ///< progress
 };
 reply_parts split_reply(std::string_view line) noexcept;
+/// The other way round.
+std::string reply_line(std::uint64_t id, std::string_view rest);
+
+/// "taken=0b1c2d3e4f5a6b7c", which precedes a reply, or is an acknowledgement. Removes it from `message`.
+std::string_view take_taker(std::string_view& message) noexcept;
+std::string taken_text(std::string_view instance);
+
+/// Lines of bridges to each other.
+inline constexpr std::string_view lost_line = "PUSH self:cles/lost";
+inline constexpr std::string_view names_line = "PULL self:cles/names";
+/// Of a bridge, or between bridge and node.
+std::string cancel_line(std::uint64_t number);
+/// The number that is cancelled, 0 if it cannot be one; nothing: the request cancels nothing.
+std::optional<std::uint64_t> cancelled_number(const protocol::request_line& request) noexcept;
 
 } // namespace cles::bridging

@@ -10,91 +10,110 @@ namespace cles::bridging {
 namespace {
 
 auto subject_key(const foreign_noun& n) { return std::tie(n.pool, n.node, n.task); }
+auto noun_key(const foreign_noun& n) { return std::tie(n.pool, n.node, n.task, n.parameters); }
 
-foreign_noun first_of(std::string pool, std::string node, std::string task) {
-    return {.pool = std::move(pool), .node = std::move(node), .task = std::move(task), .parameters = {}, .target = {}};
+// Whether one is bound that has this key. \param first of those that may have it
+template <class Bindings, class Key>
+bool has_key(const Bindings& bound, const foreign_noun& first, Key key_of) {
+    const auto next = bound.lower_bound(first);
+    return next != bound.end() && key_of(next->first) == key_of(first);
 }
 
 } // namespace
 
-bool foreign_feeds::is_subscribed(const foreign_noun& noun) const {
-    const auto next = bound_.lower_bound(first_of(noun.pool, noun.node, noun.task));
-    return next != bound_.end() && subject_key(next->first) == subject_key(noun);
-}
-
-bool foreign_feeds::add(const foreign_noun& noun, std::uint64_t id) {
-    const bool is_new = !is_subscribed(noun);
-    auto& b = bound_[noun];
-    asked_.erase(b.id);
-    b.id = id;
-    asked_.emplace(id, noun);
-    return is_new;
-}
-
-std::vector<foreign_feeds::update> foreign_feeds::on_bound(std::uint64_t id, std::string_view taker) {
-    const auto asked = asked_.find(id);
-    if (asked == asked_.end()) {
-        return {};
+void foreign_feeds::bind(const foreign_noun& noun, std::uint64_t id) {
+    if (!has_key(bound_, {noun.pool, noun.node, noun.task}, subject_key)) {
+        out_.subscribe(noun.subject(), false);
     }
-    auto& [noun, b] = *bound_.find(asked->second);
-    asked_.erase(asked);
-    b.id = 0;
-    b.taker = taker;
-    std::vector<update> waiting;
-    for (auto& line : std::exchange(b.held, {})) {
-        waiting.push_back({noun.on(), std::move(line)});
+    bound_[noun].id = id;
+    asked_.insert_or_assign(id, noun);
+}
+
+void foreign_feeds::unbind(const foreign_noun& noun) {
+    if (const auto found = bound_.find(noun); found != bound_.end()) {
+        erase(found, true);
     }
-    return waiting;
 }
 
-foreign_feeds::removed foreign_feeds::take(bindings::iterator which) {
-    removed gone{.taker = std::move(which->second.taker), .noun = which->first};
-    asked_.erase(which->second.id);
-    bound_.erase(which);
-    gone.is_last = !is_subscribed(gone.noun);
-    auto first = gone.noun;
-    first.target.clear();
-    first.link = 0;
-    const auto next = bound_.lower_bound(first);
-    gone.is_only = next == bound_.end() || subject_key(next->first) != subject_key(first) ||
-                   next->first.parameters != first.parameters;
-    return gone;
-}
-
-std::optional<foreign_feeds::removed> foreign_feeds::remove(const foreign_noun& noun) {
-    const auto found = bound_.find(noun);
-    return found == bound_.end() ? std::nullopt : std::optional{take(found)};
-}
-
-std::optional<foreign_feeds::removed> foreign_feeds::remove(std::uint64_t id) {
-    const auto asked = asked_.find(id);
-    return asked == asked_.end() ? std::nullopt : std::optional{take(bound_.find(asked->second))};
+void foreign_feeds::erase(bindings::iterator which, bool tells) {
+    const auto gone = bound_.extract(which);
+    const auto& noun = gone.key();
+    if (!has_key(bound_, {noun.pool, noun.node, noun.task}, subject_key)) {
+        out_.unsubscribe(noun.subject());
+    }
+    const auto& taker = gone.mapped().taker;
+    if (tells && !taker.empty() && !has_key(bound_, {noun.pool, noun.node, noun.task, noun.parameters}, noun_key)) {
+        end_at(taker, noun);
+    }
 }
 
 template <class Condition>
-std::vector<foreign_feeds::removed> foreign_feeds::remove_if(Condition concerns) {
-    std::vector<removed> all;
+void foreign_feeds::erase_if(Condition concerns, bool tells) {
     for (auto at = bound_.begin(); at != bound_.end();) {
         const auto here = at++;
-        if (concerns(here->first, here->second)) {
-            all.push_back(take(here));
+        if (concerns(here->first)) {
+            erase(here, tells);
         }
     }
-    return all;
+    std::erase_if(asked_, [&concerns](const auto& each) { return concerns(each.second); });
 }
 
-std::vector<foreign_feeds::removed> foreign_feeds::remove_link(const bridge_link& link) {
-    return remove_if([&link](const foreign_noun& n, const binding&) { return n.on() == link; });
+void foreign_feeds::end_at(std::string_view taker, const foreign_noun& noun) {
+    nats_.send_control({noun.pool, std::string{taker}},
+                       text_of(verb::bind, noun.node, noun.task, noun.parameters + " lease=0"));
 }
 
-std::vector<foreign_feeds::removed> foreign_feeds::remove_pool(std::string_view pool) {
-    return remove_if([pool](const foreign_noun& n, const binding&) { return n.pool == pool; });
+void foreign_feeds::on_answer(std::uint64_t id, bool is_failure, std::string_view taker) {
+    const auto asked = asked_.extract(id);
+    if (asked.empty()) {
+        return;
+    }
+    const auto found = bound_.find(asked.mapped());
+    const bool is_last = found != bound_.end() && found->second.id == id;
+    if (is_failure) {
+        if (is_last) {
+            erase(found, false);
+        }
+        return;
+    }
+    if (found == bound_.end() && !taker.empty()) { // the node has ended it meanwhile
+        end_at(taker, asked.mapped());
+    }
+    if (is_last) {
+        auto& b = found->second;
+        b.id = 0;
+        b.taker = taker;
+        for (auto& line : std::exchange(b.held, {})) {
+            out_.deliver(found->first.on(), std::move(line));
+        }
+    }
 }
 
-std::vector<foreign_feeds::removed> foreign_feeds::remove_held(const bridge_id& taker) {
-    return remove_if([&taker](const foreign_noun& n, const binding& b) {
-        return n.pool == taker.pool && b.taker == taker.instance && b.id == 0;
-    });
+void foreign_feeds::cancel(std::uint64_t id) {
+    const auto asked = asked_.extract(id);
+    const auto found = asked.empty() ? bound_.end() : bound_.find(asked.mapped());
+    if (found != bound_.end() && found->second.id == id) {
+        erase(found, true);
+    }
+}
+
+void foreign_feeds::close(const bridge_link& link) {
+    erase_if([&link](const foreign_noun& n) { return n.on() == link; }, true);
+}
+
+void foreign_feeds::lose_pool(std::string_view pool) {
+    erase_if([pool](const foreign_noun& n) { return n.pool == pool; }, false);
+}
+
+void foreign_feeds::on_lost(const bridge_id& taker, std::string_view why) {
+    for (auto at = bound_.begin(); at != bound_.end();) {
+        const auto here = at++;
+        const auto& [noun, b] = *here;
+        if (noun.pool == taker.pool && b.taker == taker.instance && b.id == 0) {
+            out_.lose_binding(noun.on(), noun.text(), why); // the node binds it again
+            erase(here, true);
+        }
+    }
 }
 
 void foreign_feeds::clear() {
@@ -102,28 +121,26 @@ void foreign_feeds::clear() {
     asked_.clear();
 }
 
-std::vector<foreign_feeds::update> foreign_feeds::on_update(const subject& about, std::string_view message) {
-    std::vector<update> lines;
-    const auto first = first_of(about.pool, about.node, about.task);
+void foreign_feeds::on_update(const subject& about, std::string_view message) {
+    ++nats_.counts().updates_received;
+    const foreign_noun first{about.pool, about.node, about.task};
     for (auto at = bound_.lower_bound(first); at != bound_.end() && subject_key(at->first) == subject_key(first);
          ++at) {
-        const auto& [noun, b] = *at;
+        auto& [noun, b] = *at;
         const auto& parameters = noun.parameters;
         if (!message.starts_with(parameters) || message.substr(parameters.size(), 1) != " ") {
             continue;
         }
         auto line = text_of(verb::update, noun.target, noun.task, message);
         if (b.id == 0) {
-            lines.push_back({noun.on(), std::move(line)});
+            out_.deliver(noun.on(), std::move(line));
             continue;
         }
-        auto& held = at->second.held;
-        held.push_back(std::move(line));
-        if (held.size() > max_held) { // shows as a gap
-            held.pop_front();
+        b.held.push_back(std::move(line));
+        if (b.held.size() > max_held) { // shows as a gap
+            b.held.pop_front();
         }
     }
-    return lines;
 }
 
 } // namespace cles::bridging

@@ -1,16 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "federation/heartbeat.hpp"
 
+#include <cles/convert.hpp>
 #include <cles/json_reader.hpp>
-#include <cles/json_writer.hpp>
 
 #include "federation/subject.hpp"
 #include "protocol/fnv1a.hpp"
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <limits>
+#include <utility>
 
 namespace cles::bridging {
 namespace {
@@ -27,62 +26,56 @@ std::uint64_t hash_of(const std::vector<std::string>& names) {
     return hash;
 }
 
+// The members as they are sent.
+struct heartbeat_members {
+    std::string node;
+    std::optional<std::uint64_t> interval_ms{};
+    std::string names;
+    std::optional<std::string> replaces{};
+    std::optional<bool> leaving{};
+    std::optional<bool> starting{};
+    std::optional<bool> closing{};
+    std::optional<std::uint32_t> roster{};
+};
+BOOST_DESCRIBE_STRUCT(heartbeat_members, (), (node, interval_ms, names, replaces, leaving, starting, closing, roster))
+
+template <class T>
+bool read_all(std::string_view text, T& read) {
+    json_reader r{text, max_depth};
+    return read_json(r, read) && r.at_end();
+}
+
 } // namespace
 
 std::string text_of(const heartbeat& said) {
-    std::string text;
-    json_writer w{text};
-    w.begin_object();
-    w.key("node");
-    w.value(std::string_view{said.node});
-    w.key("interval_ms");
-    w.value(std::uint64_t(said.interval.count()));
-    w.key("names");
-    w.value(std::string_view{said.names});
-    if (!said.replaces.empty()) {
-        w.key("replaces");
-        w.value(std::string_view{said.replaces});
-    }
-    for (const auto& [key, is_set] : {std::pair{"leaving", said.leaving}, std::pair{"starting", said.starting},
-                                      std::pair{"closing", said.closing}}) {
-        if (is_set) {
-            w.key(key);
-            w.value(true);
-        }
-    }
-    if (said.roster != 0) {
-        w.key("roster");
-        w.value(std::uint64_t{said.roster});
-    }
-    w.end_object();
-    return text;
+    const auto flag = [](bool is_set) { return is_set ? std::optional{true} : std::nullopt; };
+    return to_json(heartbeat_members{.node = said.node,
+                                     .interval_ms = static_cast<std::uint64_t>(said.interval.count()),
+                                     .names = said.names,
+                                     .replaces = said.replaces.empty() ? std::nullopt : std::optional{said.replaces},
+                                     .leaving = flag(said.leaving),
+                                     .starting = flag(said.starting),
+                                     .closing = flag(said.closing),
+                                     .roster = said.roster == 0 ? std::nullopt : std::optional{said.roster}});
 }
 
 std::optional<heartbeat> parse_heartbeat(std::string_view text) {
-    heartbeat read;
-    json_reader r{text, max_depth};
-    std::string_view key;
-    std::uint64_t interval = 0;
-    std::uint64_t roster = 0;
-    bool good = r.begin_object();
-    while (good && r.next_key(key)) {
-        good = key == "node"          ? r.read(read.node)
-               : key == "interval_ms" ? r.read(interval)
-               : key == "names"       ? r.read(read.names)
-               : key == "replaces"    ? r.read(read.replaces)
-               : key == "leaving"     ? r.read(read.leaving)
-               : key == "starting"    ? r.read(read.starting)
-               : key == "closing"     ? r.read(read.closing)
-               : key == "roster"      ? r.read(roster)
-                                      : r.skip();
-    }
-    if (!r.at_end() || !protocol::is_name(read.node) || !is_instance(read.names) ||
-        !(read.replaces.empty() || is_instance(read.replaces)) || roster > std::numeric_limits<std::uint32_t>::max()) {
+    heartbeat_members read;
+    const bool is_complete = read_all(text, read);
+    auto replaces = read.replaces.value_or("");
+    if (!is_complete || !protocol::is_name(read.node) || !is_instance(read.names) ||
+        !(replaces.empty() || is_instance(replaces))) {
         return {};
     }
-    read.roster = static_cast<std::uint32_t>(roster);
-    read.interval = std::chrono::milliseconds{std::clamp(interval, min_interval, max_interval)};
-    return read;
+    const auto interval = std::clamp(read.interval_ms.value_or(0), min_interval, max_interval);
+    return heartbeat{.node = std::move(read.node),
+                     .interval = std::chrono::milliseconds{interval},
+                     .names = std::move(read.names),
+                     .replaces = std::move(replaces),
+                     .leaving = read.leaving.value_or(false),
+                     .starting = read.starting.value_or(false),
+                     .closing = read.closing.value_or(false),
+                     .roster = read.roster.value_or(0)};
 }
 
 node_names names_of(std::vector<std::string> nodes) {
@@ -92,22 +85,9 @@ node_names names_of(std::vector<std::string> nodes) {
     return {.digest = instance_text(digest), .nodes = std::move(nodes)};
 }
 
-std::string text_of(const node_names& said) {
-    std::string text;
-    json_writer w{text};
-    w.begin_object();
-    w.key("digest");
-    w.value(std::string_view{said.digest});
-    w.key("nodes");
-    w.begin_array();
-    for (const auto& node : said.nodes) {
-        w.value(std::string_view{node});
-    }
-    w.end_array();
-    w.end_object();
-    return text;
-}
+std::string text_of(const node_names& said) { return to_json(said); }
 
+// No more than `most` names are kept while it is read.
 std::optional<node_names> parse_names(std::string_view text, std::size_t most) {
     std::string digest;
     std::vector<std::string> nodes;

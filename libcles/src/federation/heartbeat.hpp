@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <boost/describe/class.hpp>
+
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -35,6 +37,7 @@ struct node_names {
 
     bool operator==(const node_names&) const = default;
 };
+BOOST_DESCRIBE_STRUCT(node_names, (), (digest, nodes))
 
 /// \param nodes in any order
 node_names names_of(std::vector<std::string> nodes);

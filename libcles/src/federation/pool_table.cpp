@@ -91,22 +91,19 @@ bool pool_table::remove(const bridge_id& gone, time_point now) {
     return true;
 }
 
-bool pool_table::lose(const bridge_id& which, time_point now) {
-    if (!remove(which, now)) {
-        return false;
-    }
+void pool_table::lose(const bridge_id& which, time_point now) {
+    remove(which, now);
     if (lost_.size() >= max_bridges) { // the other is then not told
         lost_.clear();
     }
     lost_.insert(which);
-    return true;
 }
 
-std::vector<bridge_id> pool_table::expire(time_point now) {
+std::vector<bridge_id> pool_table::lose_if(const condition& is_lost, time_point now) {
     std::vector<bridge_id> gone;
     for (const auto& [name, p] : pools_) {
         for (const auto& [instance, b] : p.bridges) {
-            if (lost_at(b) <= now) {
+            if (is_lost(instance, b)) {
                 gone.push_back({name, instance});
             }
         }
@@ -115,6 +112,10 @@ std::vector<bridge_id> pool_table::expire(time_point now) {
         lose(each, now);
     }
     return gone;
+}
+
+std::vector<bridge_id> pool_table::expire(time_point now) {
+    return lose_if([now](const std::string&, const bridge& b) { return lost_at(b) <= now; }, now);
 }
 
 void pool_table::note_suspension(time_point now) {

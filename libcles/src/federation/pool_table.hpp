@@ -52,9 +52,9 @@ class pool_table {
     arrival on_heartbeat(const bridge_id& from, const heartbeat& said, time_point now);
     /// Removes a bridge. Returns false if it is not known.
     bool remove(const bridge_id& gone, time_point now);
-    /// The same for one that does not know that it is lost: if it returns, it is told. Returns false if it is not
-    /// known.
-    bool lose(const bridge_id& which, time_point now);
+    using condition = std::function<bool(const std::string& instance, const bridge& which)>;
+    /// The same for those that do not know that they are lost: if they return, they are told. Returns them.
+    std::vector<bridge_id> lose_if(const condition& is_lost, time_point now);
     /// Loses those that were silent for too long, and returns them.
     std::vector<bridge_id> expire(time_point now);
     /// Nothing could be received for a while: silence counts from now on.
@@ -88,6 +88,7 @@ class pool_table {
 
   private:
     bool make_room();
+    void lose(const bridge_id& which, time_point now);
 
     std::map<std::string, pool, std::less<>> pools_;
     std::set<bridge_id> lost_; ///< that may not know it

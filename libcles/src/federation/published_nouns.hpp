@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "federation/bridge_connection.hpp"
+#include "federation/bridge_output.hpp"
 #include "federation/subject.hpp"
+#include "protocol/request_line.hpp"
 
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
@@ -15,7 +17,8 @@
 
 namespace cles::bridging {
 
-/// The nouns of this pool that this bridge publishes for others: each is bound once at the node, for all that want it.
+/// The nouns of this pool that this bridge publishes for others: each is bound once at the node, for all that want it,
+/// and each of its updates is published once.
 class published_nouns {
   public:
     struct subscriber {
@@ -24,29 +27,20 @@ class published_nouns {
 
         auto operator<=>(const subscriber&) const = default; // NOLINT(modernize-use-nullptr): not about pointers
     };
-    struct reply {
-        std::vector<std::string> to; ///< subjects
-        bool ends = false;           ///< nobody is bound any more
-        std::string noun;
-    };
 
-    /// Somebody binds. Returns the id with which BIND is to be sent to the node; 0 if the reply to an earlier one will
-    /// do.
-    std::uint64_t bind(const std::string& noun, subscriber who);
-    /// The node has replied to the BIND with that id. Empty if there is none.
-    [[nodiscard]] reply on_reply(std::uint64_t id, bool is_failure);
-    /// Returns whether the node is to end the binding, because nobody else has it.
-    bool unbind(const std::string& noun, const bridge_id& by);
-    /// Nobody waits any more for the reply to that BIND, which may have been sent. Returns the noun that the node is to
-    /// unbind, if any.
-    std::optional<std::string> cancel(const subscriber& who);
-    /// That bridge is lost. Returns the nouns that the node is to unbind.
-    std::vector<std::string> remove(const bridge_id& by);
-    /// All bindings have ended. Returns those who had them.
-    std::set<bridge_id> clear();
+    published_nouns(bridge_connection& nats, bridge_output& out) noexcept : nats_(nats), out_(out) {}
 
-    [[nodiscard]] std::uint64_t next_id() noexcept { return ++last_id_; }
-    [[nodiscard]] std::size_t size() const noexcept { return nouns_.size(); }
+    void bind(const protocol::request_line& request, subscriber who);
+    void unbind(const std::string& noun, const bridge_id& by);
+    /// Nobody waits any more for the reply to that BIND, which may have been sent.
+    void cancel(const subscriber& who);
+    void on_lost(const bridge_id& by);
+    /// An update of the node, or its reply to BIND.
+    void on_line(std::string_view line);
+    /// The node has closed the link: those who were bound are told.
+    void on_closed();
+    /// The connection is lost. Nothing is reported.
+    void clear() noexcept { nouns_.clear(); }
 
   private:
     static constexpr std::size_t max_binds = 64; // of one bridge and noun; more are not told apart
@@ -55,8 +49,16 @@ class published_nouns {
         std::vector<subscriber> waiting;                  ///< for the reply
         std::uint64_t asked = 0;                          ///< the id of the BIND that is not answered; 0: none
     };
+    using entries = std::map<std::string, entry, std::less<>>; // by the noun: "car1:localization/fast"
 
-    std::map<std::string, entry, std::less<>> nouns_; // "car1:localization/fast"
+    void publish_update(std::string_view line);
+    void on_reply(std::uint64_t id, std::string_view reply);
+    void end(entries::iterator which);
+    void deliver(std::string line);
+
+    bridge_connection& nats_;
+    bridge_output& out_;
+    entries nouns_;
     std::uint64_t last_id_ = 0;
 };
 

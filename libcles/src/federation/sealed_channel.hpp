@@ -3,6 +3,8 @@
 
 #include <cles/limits.hpp>
 
+#include "federation/bridge.hpp"
+#include "federation/received_message.hpp"
 #include "federation/subject.hpp"
 #include "port/message_seal.hpp"
 
@@ -27,37 +29,21 @@ class sealed_channel {
         return seal_->seal(subject, reply, message);
     }
 
-    enum class outcome : std::uint8_t {
-        opened,   ///< for the bridge
-        consumed, ///< it was for the seal
-        refused,
-        unproven, ///< nothing has proved yet that the sender is alive
-    };
-    struct received {
-        outcome what = outcome::refused;
-        std::string_view sender{};   ///< the member, if it was opened
-        std::string instance{};      ///< of the sender, if it was opened
-        std::string_view message{};  ///< if it was opened; valid until the next call
-        std::string_view why{};      ///< it was refused
-        bool heartbeat_soon = false; ///< this bridge or another one has become known, or asks
-    };
-    received receive(std::string_view where, std::string_view reply, std::string_view bytes, time_point now);
+    /// Passes a message to the bridge if it counts, and tells it what the message says even so. This object may be gone
+    /// afterwards.
+    void receive(received_message m, bridge& to);
     /// That bridge is lost. It has to prove again that it is alive.
     void forget(const bridge_id& lost);
     /// A bridge has stated the version of its roster.
     void on_stated_roster(const bridge_id& by, std::uint32_t version, time_point now);
 
-    struct outgoing {
-        std::string subject;
-        std::string reply;
-        std::string message;
-    };
-    /// What is to be published as it is.
-    std::vector<outgoing> take_questions();
+    /// What is to be published as it is, with `questions` as the subject for replies.
+    std::vector<core::message_seal::question> take_questions() { return seal_->take_questions(questions_); }
+    [[nodiscard]] const std::string& questions() const noexcept { return questions_; }
 
   private:
     std::unique_ptr<core::message_seal> seal_;
-    std::string questions_; // the own subject for them
+    const std::string questions_; // the own subject for them
 };
 
 } // namespace cles::bridging

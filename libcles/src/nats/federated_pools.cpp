@@ -4,6 +4,7 @@
 #include <cles/error.hpp>
 #include <cles/json_writer.hpp>
 
+#include "federation/carried_line.hpp"
 #include "node/local_node.hpp"
 #include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
@@ -181,7 +182,7 @@ void federated_pools::leave() {
 void federated_pools::stop_if_finished() {
     if (leaving_ && links_.empty() && !std::exchange(stopped_, true)) {
         if (connection_) {
-            bridge_->say_left();
+            bridge_->say_left(now());
             connection_->flush();
             connection_->stop();
         }
@@ -368,7 +369,7 @@ void federated_pools::on_event(const event& e) {
     case event::kind::connected: on_connected(e); break;
     case event::kind::disconnected:
         log_once("the connection to NATS was lost: " + e.text);
-        bridge_->on_disconnected(e.text);
+        bridge_->on_disconnected(e.text, now());
         break;
     case event::kind::refused: log_once("cannot connect to NATS: " + e.text + " (trying again)"); break;
     case event::kind::problem: log_once("NATS: " + e.text); break;
@@ -399,26 +400,13 @@ void federated_pools::on_connected(const event& e) {
 }
 
 void federated_pools::on_message(const event& e) {
-    const auto at = now();
+    const bridging::received_message received{e.subject, e.reply, e.text, now()};
     if (!is_secured_) {
-        bridge_->on_message(e.subject, e.reply, e.text, at);
+        bridge_->on_message(received);
         return;
     }
-    if (!channel_) {
-        return;
-    }
-    using outcome = bridging::sealed_channel::outcome;
-    const auto found = channel_->receive(e.subject, e.reply, e.text, at);
-    switch (found.what) {
-    case outcome::opened:
-        bridge_->on_message(e.subject, e.reply, found.message, at, {found.sender, found.instance});
-        break;
-    case outcome::unproven: bridge_->on_unproven(e.subject, e.reply, at); break;
-    case outcome::refused: bridge_->on_refused(e.subject, found.why, at); break;
-    case outcome::consumed: break;
-    }
-    if (found.heartbeat_soon) {
-        bridge_->announce_soon(at);
+    if (channel_) {
+        channel_->receive(received, *bridge_);
     }
     if (channel_) { // a link that was refused may have been the last one
         publish_questions();
@@ -431,7 +419,7 @@ void federated_pools::publish_questions() {
         if (each.message.size() > always_sent && unsent() + reserved_room > nats_connection::max_unsent) {
             continue; // a roster, which will be asked for again
         }
-        connection_->publish(std::move(each.subject), std::move(each.reply), std::move(each.message));
+        connection_->publish(std::move(each.subject), channel_->questions(), std::move(each.message));
     }
 }
 
@@ -509,12 +497,10 @@ bool federated_pools::refuse(const bridge_link& on, std::string_view line) {
 // As the node's replies, before the bridge acknowledges the requests of this batch.
 void federated_pools::answer_refused() {
     for (const auto& [on, id] : std::exchange(refused_, {})) {
-        std::string reply;
-        protocol::append_reply_head(reply, id);
-        protocol::append_failure(reply, {.code = errc::busy,
-                                         .message = "too many requests of other pools wait at this bridge",
-                                         .retry_ms = protocol::default_retry_ms});
-        bridge_->on_line(on, reply, now());
+        const auto why = protocol::failure_text({.code = errc::busy,
+                                                 .message = "too many requests of other pools wait at this bridge",
+                                                 .retry_ms = protocol::default_retry_ms});
+        bridge_->on_line(on, bridging::reply_line(id, why), now());
     }
 }
 
@@ -585,11 +571,8 @@ std::string federated_pools::how_to_permit(std::string_view member) const {
 std::optional<protocol::failure> federated_pools::refusal(std::string_view member,
                                                           const protocol::request_line& bind) const {
     const auto host = host_.lock();
-    const identity peer{.transport = "pool",
-                        .address = "pool://" + options_.pool,
-                        .name = std::string{member},
-                        .uid = {},
-                        .local = false};
+    const auto peer =
+        pool_link::identity_of({.what = bridge_link::role::publications}, options_.pool, std::string{member});
     return host ? core::refusal_reason(host->node(), peer, bind) : std::nullopt;
 }
 

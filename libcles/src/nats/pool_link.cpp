@@ -27,11 +27,15 @@ std::string address_of(const bridging::bridge_link& which, const std::string& ow
 
 pool_link::pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link which, const std::string& own_pool,
                      std::string member)
-    : by_(std::move(by)), which_(std::move(which)), peer_{.transport = "pool",
-                                                          .address = address_of(which_, own_pool),
-                                                          .name = std::move(member),
-                                                          .uid = {},
-                                                          .local = false} {}
+    : by_(std::move(by)), which_(std::move(which)), peer_(identity_of(which_, own_pool, std::move(member))) {}
+
+identity pool_link::identity_of(const bridging::bridge_link& which, const std::string& own_pool, std::string member) {
+    return {.transport = "pool",
+            .address = address_of(which, own_pool),
+            .name = std::move(member),
+            .uid = {},
+            .local = false};
+}
 
 // Of what waits for NATS, the part that this link has written.
 std::size_t pool_link::waiting() const noexcept {

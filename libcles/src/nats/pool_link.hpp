@@ -51,6 +51,9 @@ class pool_link final : public link, public std::enable_shared_from_this<pool_li
     /// \param member the authenticated name of the other end; empty: it has none
     pool_link(std::weak_ptr<pool_link_owner> by, bridging::bridge_link which, const std::string& own_pool,
               std::string member = {});
+    /// Of the other end of such a link.
+    [[nodiscard]] static identity identity_of(const bridging::bridge_link& which, const std::string& own_pool,
+                                              std::string member);
 
     void start(std::shared_ptr<link_events> owner) override;
     std::string& output() override { return output_; }

@@ -89,7 +89,7 @@ struct fleet_of_bridges {
     /// As if a message of that sender had been opened.
     void pass(sealed_site& to, const std::string& subject, const std::string& reply, const std::string& message,
               const message_sender& by) {
-        to->core().on_message(subject, reply, message, nats.now(), by);
+        to->core().on_message({subject, reply, message, nats.now(), by});
         nats.run_for(10ms);
     }
 };
@@ -228,10 +228,10 @@ BOOST_FIXTURE_TEST_CASE(a_request_of_a_sender_that_is_not_proved_to_be_alive_is_
 
 BOOST_FIXTURE_TEST_CASE(only_requests_are_answered_with_busy, two_pools) {
     const auto before = nats.recorded("").size();
-    gate->core().on_unproven(reply_subject(gate.id(), 1), "", nats.now());
-    gate->core().on_unproven(heartbeat_subject(hub.id()), "cles.south.bridge.0000010000000001.9", nats.now());
-    gate->core().on_unproven(request_subject(gate.id()), "", nats.now());
-    gate->core().on_unproven(request_subject(gate2.id()), "cles.south.bridge.0000010000000001.9", nats.now());
+    gate->core().on_unproven({reply_subject(gate.id(), 1), "", "", nats.now()});
+    gate->core().on_unproven({heartbeat_subject(hub.id()), "cles.south.bridge.0000010000000001.9", "", nats.now()});
+    gate->core().on_unproven({request_subject(gate.id()), "", "", nats.now()});
+    gate->core().on_unproven({request_subject(gate2.id()), "cles.south.bridge.0000010000000001.9", "", nats.now()});
     BOOST_TEST(nats.recorded("").size() == before);
 }
 
@@ -246,7 +246,7 @@ struct forged_heartbeats : three_pools {
         const auto before = refused();
         const auto bridges = gate->core().pools().bridge_count();
         const auto stated = gate->rosters.size();
-        gate->core().on_message(heartbeat_subject(of), "", text_of(said), nats.now(), west.sender());
+        gate->core().on_message({heartbeat_subject(of), "", text_of(said), nats.now(), west.sender()});
         BOOST_TEST(refused() == before + 1);
         BOOST_TEST(gate->core().pools().bridge_count() == bridges);
         BOOST_TEST((know(gate, hub) && know(gate, gate2) && know(gate, west)));
@@ -687,7 +687,7 @@ BOOST_FIXTURE_TEST_CASE(a_bridge_that_is_to_end_gets_no_more_requests, three_poo
     nats.run_for(10ms);
     BOOST_TEST(gate->bound.empty());
     BOOST_TEST(gate2->bound.size() == 8U);
-    gate->core().say_left();
+    gate->core().say_left(nats.now());
     nats.run_for(10ms);
     BOOST_TEST(!hub->core().pools().is_live(gate.id()));
 }

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from bridges import BridgesTest, pool_of
 from daemon import DEFAULTS, body, clesd
-from nats import SERVER
+from nats_server import MISSING, PROGRAM
 from support import PATIENCE, cles, wait_until
 
 
@@ -397,6 +397,6 @@ class Federation(BridgesTest):
 
 
 if __name__ == "__main__":
-    if SERVER is None:
-        raise SystemExit("nats-server is missing: scripts/setup installs it")
+    if PROGRAM is None:
+        raise SystemExit(MISSING)
     unittest.main()

@@ -2,54 +2,28 @@
 """A NATS server for a test, and a program that uses it without CLES."""
 
 import json
-import re
-import shutil
 import socket
-import subprocess
 
+import nats_server
 from daemon import Folder
-from support import PATIENCE, wait_until
-
-SERVER = shutil.which("nats-server") or shutil.which("nats-server", path="/usr/sbin:/usr/local/sbin")
+from support import PATIENCE
 
 
-class NatsServer(Folder):
-    """A nats-server on loopback, which can be stopped and started again at the same port."""
-
+class NatsServer(nats_server.NatsServer):
     def __init__(self, more=""):
-        super().__init__()
-        self.more = more
-        self.port = -1  # any
-        self.start()
-
-    def start(self):
-        config = self.write(f"host: 127.0.0.1\nport: {self.port}\n{self.more}\n", "nats.conf")
-        log = self.file("nats.log")
-        self.write("", "nats.log")
-        self.process = subprocess.Popen([SERVER, "-c", config, "-l", log], stdin=subprocess.DEVNULL,
-                                        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        wait_until(lambda: "Server is ready" in self.read("nats.log"), "the server is ready")
-        self.port = int(re.search(r"client connections on 127\.0\.0\.1:(\d+)", self.read("nats.log"))[1])
-
-    @property
-    def url(self):
-        return f"nats://127.0.0.1:{self.port}"
+        self.folder = Folder()
+        super().__init__(self.folder.path, more)
 
     @property
     def tls_url(self):
         return f"tls://127.0.0.1:{self.port}"
-
-    def stop(self):
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait()
 
     def client(self, **options):
         return NatsClient(self.port, **options)
 
     def __exit__(self, *_):
         self.stop()
-        super().__exit__()
+        self.folder.__exit__()
 
 
 class NatsClient:

@@ -15,8 +15,8 @@ from pathlib import Path
 from bridges import BridgesTest, pool_of
 from certificates import OPENSSL, Authority
 from daemon import DEFAULTS, body, clean_environment, clesd
-from nats import SERVER
 from nats_accounts import Account, Operator, User
+from nats_server import MISSING, PROGRAM
 from support import PATIENCE, wait_until
 
 REFUSED = "cannot connect to NATS: "
@@ -429,8 +429,8 @@ class Permissions(SecuredBridgesTest):
 
 
 if __name__ == "__main__":
-    if SERVER is None:
-        raise SystemExit("nats-server is missing: scripts/setup installs it")
+    if PROGRAM is None:
+        raise SystemExit(MISSING)
     if OPENSSL is None:
         raise SystemExit("openssl is missing: scripts/setup installs it")
     unittest.main()

@@ -14,7 +14,8 @@ import unittest
 
 from daemon import PLUGINS, clean_environment
 from fleet import COUNTING
-from nats import SERVER, NatsServer
+from nats import NatsServer
+from nats_server import MISSING, PROGRAM
 from secured import Fleet, Node
 from support import CLES, PATIENCE, wait_until
 
@@ -294,6 +295,6 @@ class SecuredFederation(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    if SERVER is None:
-        raise SystemExit("nats-server is missing: scripts/setup installs it")
+    if PROGRAM is None:
+        raise SystemExit(MISSING)
     unittest.main()
