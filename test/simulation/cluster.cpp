@@ -5,13 +5,13 @@
 
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
-#include "simulation/world/node_hosts.hpp"
-#include "simulation/world/work_pool.hpp"
+#include "simulation/world/daemon_hosts.hpp"
 
 #include <array>
-#include <map>
+#include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace cles::simulation {
@@ -23,25 +23,28 @@ using std::chrono::seconds;
 constexpr unsigned hub_host = 0;
 constexpr unsigned client_host = 4;
 constexpr std::array<unsigned, 3> workers{1, 2, 3};
+constexpr std::size_t most_jobs_queued = 5;
 constexpr int vital_requests = 20;
 
 std::string name_of(unsigned host) { return "car" + std::to_string(host); }
 
-class cluster final : public node_hosts {
+class cluster final : public daemon_hosts {
   public:
-    cluster(std::uint64_t seed, planted fault, bool sharing) : node_hosts(seed, fault), sharing_(sharing) {
+    cluster(std::uint64_t seed, planted fault, bool sharing)
+        : daemon_hosts(seed, fault, most_jobs_queued), sharing_(sharing) {
         start(hub_host);
         start(client_host);
         for (const auto host : workers) {
             start(host);
         }
-        time_.watch([this] { check_bounds(); });
+        time_.watch([this] {
+            for (auto* n : running()) {
+                check(*n);
+            }
+        });
     }
-    cluster(const cluster&) = delete;
-    cluster& operator=(const cluster&) = delete;
-    ~cluster() { end_all(); }
 
-    cluster_report live(seconds trouble) {
+    work_report live(seconds trouble) {
         const auto end = time_.now() + trouble;
         while (time_.now() < end) {
             ask(false);
@@ -57,28 +60,24 @@ class cluster final : public node_hosts {
             ask(true);
         }
         pass(seconds{20});
-        judge_requests();
-        for (const auto& [host, n] : nodes_) {
+        requests_.judge();
+        for (auto* n : running()) {
             n->local().discovery().leave();
         }
         pass(seconds{200});
-        judge_rest();
+        for (auto* n : running()) {
+            n->check_rest();
+        }
+        for (const auto host : workers) {
+            pool_of(host).check_rest();
+            count(*node(host));
+        }
+        report_.jobs = requests_.tally();
         report_.violations = watcher_.violations();
         return report_;
     }
 
   private:
-    struct asked {
-        std::uint32_t op = 0;
-        bool may_repeat = false;
-        bool vital = false; ///< has to succeed, or to be refused because all are busy
-        time_point deadline{};
-        int ends = 0;
-        bool succeeded = false;
-        errc code{};
-        int ran = 0; ///< the number of executions, on any node
-    };
-
     // -- nodes -----------------------------------------------------------------------------------------------------
 
     void start(unsigned host) override {
@@ -87,47 +86,21 @@ class cluster final : public node_hosts {
             net_, host, ++runs_, name_of(host),
             node_run::options{.seed = chance_.next(),
                               .multicast = host != client_host,
-                              .load = is_worker ? [this, host] { return pools_[host]->load(); }
+                              .load = is_worker ? [this, host] { return pool_of(host).load(); }
                                                 : std::function<node_load()>{},
                               .routing = host == hub_host || (is_worker && sharing_) ? cles::routing() : nullptr});
         nodes_[host] = n;
         if (is_worker) {
-            pools_[host] = std::make_shared<work_pool>(*n);
-            if (sharing_) {
-                pools_[host]->share();
-            }
-            offer(*n, pools_[host]);
+            add_pool(*n, sharing_);
+            offer(*n, verb::delegate, "once", false);
+            offer(*n, verb::delegate, "again", true);
+            offer(*n, verb::pull, "look", false);
         }
         n->start();
     }
 
-    void offer(node_run& n, const std::shared_ptr<work_pool>& pool) {
-        const auto add = [&](verb v, const std::string& task, bool idempotent) {
-            n.node()->tasks.add(v, task,
-                                {.info = {.idempotent = idempotent},
-                                 .start = [this, pool](const request& r, const std::shared_ptr<core::call>& c) {
-                                     const auto op = r.parameter<std::uint32_t>(0);
-                                     if (fault() == planted::call_kept && kept_ == nullptr) {
-                                         kept_ = c;
-                                     }
-                                     pool->submit({.requester = op % 4,
-                                                   .answer = c,
-                                                   .work = milliseconds{r.parameter<unsigned>(1)},
-                                                   .heeds = op % 16 != 0,
-                                                   .begun = [this, op] { ++asked_.at(op).ran; }});
-                                 }});
-        };
-        add(verb::delegate, "once", false);
-        add(verb::delegate, "again", true);
-        add(verb::pull, "look", false);
-    }
-
-    void end_run(node_run& n) override {
-        if (const auto pool = pools_.find(n.host()); pool != pools_.end()) {
-            report_.moved += pool->second->sent() - pool->second->returned();
-            pool->second->crash();
-        }
-        n.crash();
+    work_pool::order order_of(const request&, std::uint32_t op) override {
+        return {.requester = op % 4, .heeds = op % 16 != 0};
     }
 
     // -- faults ----------------------------------------------------------------------------------------------------
@@ -169,73 +142,23 @@ class cluster final : public node_hosts {
                                                                                  {verb::delegate, "any:again"},
                                                                                  {verb::pull, "any:look"},
                                                                                  {verb::delegate, "all:again"}}};
-        const auto op = ++last_op_;
-        auto& a = asked_[op];
         const auto kind = chance_.below(4);
-        const auto limit = vital ? 5000U : chance_.between(50, 3000);
+        const milliseconds limit{vital ? 5000U : chance_.between(50, 3000)};
         const auto long_work = chance_.chance(40) ? chance_.between(500, 4000) : chance_.below(250);
-        a.op = op;
-        a.deadline = time_.now() + milliseconds{limit};
-        a.may_repeat = kind != 0;
-        a.vital = vital;
+        const auto op = requests_.add({.most_runs = kind == 0 ? 1 : ledger::any_number,
+                                       .vital = vital,
+                                       .may_be_refused = true,
+                                       .deadline = time_.now() + limit});
         const auto noun =
             std::string{kinds[kind].second} + "/" + std::to_string(op) + "/" + std::to_string(vital ? 10U : long_work);
         auto& client = *node(client_host);
         client.run([&] {
-            client.ask(hub_host, carrier::stream,
-                       {.verb = kinds[kind].first, .noun = noun, .deadline = milliseconds{limit}},
-                       when_ended([this, &a](std::string_view) { end(a).succeeded = true; },
-                                  [this, &a](errc code, std::string_view) { end(a).code = code; }));
+            client.ask(hub_host, carrier::stream, {.verb = kinds[kind].first, .noun = noun, .deadline = limit},
+                       requests_.operation(op));
         });
     }
 
-    asked& end(asked& a) {
-        if (++a.ends != 1) {
-            complain(rule::ends_in_time, a, "ended again");
-        }
-        if (time_.now() > a.deadline) {
-            complain(rule::ends_in_time, a, "ended after its deadline");
-        }
-        return a;
-    }
-
     // -- checks ----------------------------------------------------------------------------------------------------
-
-    void complain(rule which, const asked& a, const std::string& what) {
-        watcher_.broken(which, "request " + std::to_string(a.op) + " " + what);
-    }
-
-    void check_bounds() {
-        for (const auto& [host, n] : nodes_) {
-            if (n) {
-                n->check_bounds();
-            }
-        }
-        for (const auto& [host, pool] : pools_) {
-            if (node(host) != nullptr) {
-                pool->check();
-            }
-        }
-    }
-
-    void judge_requests() {
-        for (const auto& [op, a] : asked_) {
-            if (a.ends == 0) {
-                complain(rule::ends_in_time, a, "has not ended");
-            }
-            if (!a.may_repeat && a.ran > 1) {
-                complain(rule::effects_once, a, "ran " + std::to_string(a.ran) + " times");
-            }
-            if (!a.may_repeat && a.succeeded && a.ran == 0) {
-                complain(rule::replies_match, a, "succeeded and had not run");
-            }
-            if (a.vital && !a.succeeded && a.code != errc::busy) {
-                complain(rule::asks_succeed, a, "fails though all is well");
-            }
-            ++(a.succeeded ? report_.succeeded : report_.failed);
-            report_.refused += a.code == errc::busy ? 1 : 0;
-        }
-    }
 
     void judge_neighbours() {
         const auto& others = node(hub_host)->node()->peers;
@@ -250,28 +173,13 @@ class cluster final : public node_hosts {
         }
     }
 
-    void judge_rest() {
-        for (const auto& [host, n] : nodes_) {
-            n->check_rest();
-        }
-        for (const auto& [host, pool] : pools_) {
-            pool->check_rest();
-            report_.moved += pool->sent() - pool->returned();
-        }
-    }
-
     const bool sharing_;
-    std::map<unsigned, std::shared_ptr<work_pool>> pools_;
-    std::map<std::uint32_t, asked> asked_;
-    std::shared_ptr<core::call> kept_; // by a planted fault
-    std::uint32_t last_op_ = 0;
     unsigned runs_ = 0;
-    cluster_report report_;
 };
 
 } // namespace
 
-cluster_report simulate_cluster(std::uint64_t seed, seconds trouble, planted fault, bool sharing) {
+work_report simulate_cluster(std::uint64_t seed, seconds trouble, planted fault, bool sharing) {
     return cluster{seed, fault, sharing}.live(trouble);
 }
 

@@ -2,29 +2,18 @@
 #pragma once
 
 #include "simulation/network/planted.hpp"
-#include "simulation/world/witness.hpp"
+#include "simulation/world/work_report.hpp"
 
 #include <chrono>
-#include <cstddef>
 #include <cstdint>
-#include <vector>
 
 namespace cles::simulation {
-
-/// The result of a simulated cluster.
-struct cluster_report {
-    std::vector<violation> violations;
-    std::size_t succeeded = 0; ///< of the client's requests
-    std::size_t failed = 0;
-    std::size_t refused = 0; ///< of those that failed
-    std::size_t moved = 0;   ///< jobs, from one worker to another
-};
 
 /// Simulates a cluster in virtual time: one node that routes, three workers that serve as daemons do, and a client that
 /// sends requests to `any` and `all`. Workers and the router crash, are suspended and restart, their clocks jump, links
 /// are lost, and networks are partitioned, also in one direction. After the faults comes a period in which requests
 /// have to succeed, then one without activity. \param sharing the workers share their jobs
-cluster_report simulate_cluster(std::uint64_t seed, std::chrono::seconds trouble, planted fault = planted::none,
-                                bool sharing = false);
+work_report simulate_cluster(std::uint64_t seed, std::chrono::seconds trouble, planted fault = planted::none,
+                             bool sharing = false);
 
 } // namespace cles::simulation

@@ -31,17 +31,6 @@ std::uint32_t scattered(std::uint32_t n) { return n * 2654435761U; }
 
 } // namespace
 
-struct gossip_network::message {
-    enum class kind : std::uint8_t { ask, table, push, failure };
-    kind what = kind::ask;
-    std::size_t from = 0;
-    std::uint32_t to_run = 0; // of the receiver, for replies; 0: any
-    std::uint32_t from_run = 0;
-    std::uint64_t ticket = 0;
-    std::string text{};
-    std::string describe{};
-};
-
 /// One incarnation of a node.
 class gossip_network::member final : public place,
                                      public core::announcer::sender,
@@ -76,17 +65,28 @@ class gossip_network::member final : public place,
     [[nodiscard]] std::size_t others() const override { return others_known.size(); }
 
     void ask(std::uint64_t ticket, const destination& at, const core::table_question& what) override {
-        post(at.url, {.what = message::kind::ask,
-                      .ticket = ticket,
-                      .text = std::string{what.since},
-                      .describe = std::string{what.describe}});
+        const auto fail = for_run(run_number, [ticket](member& m) { m.gossip.on_failure(ticket, m.now()); });
+        const auto answer = [ticket, from = host(), run = run_number, since = std::string{what.since},
+                             describe = std::string{what.describe}](member& m) {
+            m.bytes += on_the_wire(request_head + since.size() + describe.size());
+            std::string table;
+            json_writer w{table};
+            m.gossip.write_delta(w, {since, describe}, 1U << 20U, m.now());
+            m.net.send(m.host(), from, table.size(), for_run(run, [ticket, table](member& asker) {
+                           asker.bytes += on_the_wire(reply_head + table.size());
+                           asker.gossip.on_answer(ticket, table, asker.now());
+                       }));
+        };
+        post(at, what.since.size(), answer, fail);
         // If no reply arrives, the link's own code reports that at the deadline.
-        net.deliver(net.time_.now() + core::gossip::limit, host(),
-                    {.what = message::kind::failure, .to_run = run_number, .ticket = ticket});
+        net.deliver(net.time_.now() + core::gossip::limit, host(), fail);
     }
     void ask_description(std::uint64_t, const destination&) override {} // all nodes here know `since`
-    void push(const destination& at, std::string_view table) override {
-        post(at.url, {.what = message::kind::push, .text = std::string{table}});
+    void push(const destination& at, std::string_view pushed) override {
+        post(at, pushed.size(), [table = std::string{pushed}, source = url](member& m) {
+            m.bytes += on_the_wire(request_head + table.size());
+            m.gossip.on_pushed_table(table, core::observed_source::at(source), m.now());
+        });
     }
     void release(const destination&) override {}
 
@@ -103,12 +103,18 @@ class gossip_network::member final : public place,
         }
     }
 
-    void post(std::string_view at, message m) {
-        const auto to = net.by_url_.find(at);
-        m.from_run = run_number;
-        if (to != net.by_url_.end()) {
-            net.send(host(), to->second, std::move(m));
+    void post(const destination& at, std::size_t size, handler arrives, handler refused = {}) {
+        if (const auto to = net.by_url_.find(at.url); to != net.by_url_.end()) {
+            net.send(host(), to->second, size, std::move(arrives), std::move(refused));
         }
+    }
+    /// Another incarnation does not get what is for this one.
+    static handler for_run(std::uint32_t run, handler what) {
+        return [run, what = std::move(what)](member& m) {
+            if (m.run_number == run) {
+                what(m);
+            }
+        };
     }
 
     void after_jump() override { net.run(*this); }
@@ -181,7 +187,7 @@ void gossip_network::wake(member& m) {
     }
 }
 
-void gossip_network::run(member& m, message* what) {
+void gossip_network::run(member& m, const handler& what) {
     if (!m.alive) {
         return;
     }
@@ -190,8 +196,8 @@ void gossip_network::run(member& m, message* what) {
         m.others_known.note_suspension(now);
     }
     m.deadlines.expire(now);
-    if (what != nullptr) {
-        handle(m, *what);
+    if (what) {
+        what(m);
     }
     wake(m);
 }
@@ -211,33 +217,29 @@ gossip_network::milliseconds gossip_network::pass_until(const std::function<bool
 
 // -- messages ------------------------------------------------------------------------------------------------------
 
-void gossip_network::send(std::size_t from, std::size_t to, message what) {
-    what.from = from;
+void gossip_network::send(std::size_t from, std::size_t to, std::size_t bytes, handler arrives, handler refused) {
     if (passes_ && !passes_(from, to)) {
         return;
     }
-    const auto way = weather_.quickest + dice_.within(weather_.slowest - weather_.quickest) +
-                     delay_by_loss(1 + what.text.size() / segment);
-    if (!members_[to]->alive) { // no node runs there: the system rejects it
-        if (what.what == message::kind::ask && (!passes_ || passes_(to, from))) {
-            deliver(time_.now() + way * 2, from,
-                    {.what = message::kind::failure, .to_run = what.from_run, .ticket = what.ticket});
-        }
-        return;
+    const auto way =
+        weather_.quickest + dice_.within(weather_.slowest - weather_.quickest) + delay_by_loss(1 + bytes / segment);
+    if (members_[to]->alive) {
+        deliver(time_.now() + way, to, std::move(arrives));
+    } else if (refused && (!passes_ || passes_(to, from))) { // no node runs there: the system rejects it
+        deliver(time_.now() + way * 2, from, std::move(refused));
     }
-    deliver(time_.now() + way, to, std::move(what));
 }
 
-void gossip_network::deliver(time_point when, std::size_t to, message what) {
-    time_.at(when, [this, to, what = std::move(what)]() mutable {
+void gossip_network::deliver(time_point when, std::size_t to, handler what) {
+    time_.at(when, [this, to, what = std::move(what)] {
         auto& m = *members_[to];
         if (!m.alive) {
             return;
         }
         deepest_queue_ = std::max(deepest_queue_, ++m.unread);
-        m.run([this, &m, what = std::move(what)]() mutable {
+        m.run([this, &m, what] {
             --m.unread;
-            run(m, &what);
+            run(m, what);
         });
     });
 }
@@ -255,33 +257,6 @@ std::chrono::microseconds gossip_network::delay_by_loss(std::size_t packets) {
         lost = dice_.chance(weather_.loss);
     }
     return delay;
-}
-
-void gossip_network::handle(member& m, message& what) {
-    const auto now = m.now();
-    if (what.to_run != 0 && what.to_run != m.run_number) {
-        return;
-    }
-    switch (what.what) {
-    case message::kind::ask: {
-        m.bytes += on_the_wire(request_head + what.text.size() + what.describe.size());
-        message answer{
-            .what = message::kind::table, .to_run = what.from_run, .from_run = m.run_number, .ticket = what.ticket};
-        json_writer w{answer.text};
-        m.gossip.write_delta(w, {what.text, what.describe}, 1U << 20U, now);
-        send(m.host(), what.from, std::move(answer));
-        break;
-    }
-    case message::kind::table:
-        m.bytes += on_the_wire(reply_head + what.text.size());
-        m.gossip.on_answer(what.ticket, what.text, now);
-        break;
-    case message::kind::push:
-        m.bytes += on_the_wire(request_head + what.text.size());
-        m.gossip.on_pushed_table(what.text, core::observed_source::at(members_[what.from]->url), now);
-        break;
-    case message::kind::failure: m.gossip.on_failure(what.ticket, now); break;
-    }
 }
 
 // -- faults of nodes -----------------------------------------------------------------------------------------------
@@ -305,12 +280,7 @@ void gossip_network::restart(std::size_t node) {
 void gossip_network::pause(std::size_t node, std::chrono::microseconds span) {
     auto& m = *members_[node];
     m.stopped_until = time_.now() + span;
-    m.freeze();
-    m.time().at(m.stopped_until, [weak = m.weak_from_this()] {
-        if (const auto alive = weak.lock()) {
-            alive->thaw();
-        }
-    });
+    m.freeze_for(span);
 }
 
 void gossip_network::jump(std::size_t node, milliseconds ahead) { members_[node]->jump(ahead); }

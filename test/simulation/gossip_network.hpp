@@ -86,16 +86,17 @@ class gossip_network {
 
   private:
     class member;
-    struct message;
+    using handler = std::function<void(member&)>;
 
-    void send(std::size_t from, std::size_t to, message what);
-    void deliver(time_point when, std::size_t to, message what);
+    /// \param bytes of the message, as far as it may need several packets
+    /// \param refused called at the sender if no node runs there
+    void send(std::size_t from, std::size_t to, std::size_t bytes, handler arrives, handler refused = {});
+    void deliver(time_point when, std::size_t to, handler what);
     [[nodiscard]] bool is_steady(const member& m) const;
     [[nodiscard]] std::size_t listing(std::size_t node, bool suspect) const;
     std::chrono::microseconds delay_by_loss(std::size_t packets);
-    void run(member& m, message* what = nullptr);
+    void run(member& m, const handler& what = {});
     void wake(member& m);
-    void handle(member& m, message& what);
     void plan_pause(std::size_t node, time_point after);
 
     dice dice_;

@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 
 BOOST_AUTO_TEST_SUITE(gossip)
 
@@ -20,6 +21,16 @@ namespace {
 constexpr bool is_slow = CLES_SIMULATION_IS_SLOW;
 constexpr std::size_t some = 36; // enough that no node asks all others
 constexpr gossip_weather rough{.loss = 50, .paused = 20};
+
+/// A network whose nodes have started a while ago.
+struct running_network : gossip_network {
+    explicit running_network(std::uint64_t seed, std::size_t nodes = some, std::size_t seeds = 3,
+                             planted fault = planted::none)
+        : gossip_network(seed, {}, fault) {
+        start(nodes, 1s, seeds);
+        pass(10s);
+    }
+};
 
 } // namespace
 
@@ -51,9 +62,7 @@ BOOST_AUTO_TEST_CASE(no_live_node_is_taken_for_gone_where_packets_are_lost_and_p
 }
 
 BOOST_AUTO_TEST_CASE(a_network_that_was_cut_in_two_is_whole_within_15_s) {
-    gossip_network net{3};
-    net.start(some, 1s);
-    net.pass(10s);
+    running_network net{3};
     BOOST_TEST(net.whole());
     net.allow([](std::size_t from, std::size_t to) { return from % 2 == to % 2; });
     net.pass(30s);
@@ -64,9 +73,7 @@ BOOST_AUTO_TEST_CASE(a_network_that_was_cut_in_two_is_whole_within_15_s) {
 }
 
 BOOST_AUTO_TEST_CASE(where_the_half_without_seeds_is_cut_off_it_finds_the_other_one_too) {
-    gossip_network net{4};
-    net.start(30, 1s, 1);
-    net.pass(10s);
+    running_network net{4, 30, 1};
     net.allow([](std::size_t from, std::size_t to) { return (from < 10) == (to < 10); });
     net.pass(60s);
     net.allow({});
@@ -74,9 +81,7 @@ BOOST_AUTO_TEST_CASE(where_the_half_without_seeds_is_cut_off_it_finds_the_other_
 }
 
 BOOST_AUTO_TEST_CASE(nobody_is_lost_where_messages_pass_one_way_only) {
-    gossip_network net{5};
-    net.start(some, 1s);
-    net.pass(10s);
+    running_network net{5};
     net.forget_verdicts();
     // One third receives from the others, but they do not receive from it; then the other way round.
     net.allow([](std::size_t from, std::size_t to) { return from % 3 != 0 || to % 3 == 0; });
@@ -112,9 +117,7 @@ BOOST_AUTO_TEST_CASE(in_a_small_network_it_is_noticed_as_soon) {
 }
 
 BOOST_AUTO_TEST_CASE(a_node_that_leaves_is_known_by_nobody_after_a_second) {
-    gossip_network net{8};
-    net.start(some, 1s);
-    net.pass(10s);
+    running_network net{8};
     net.leave(7);
     net.pass(1s);
     BOOST_TEST(net.holding(7) == 0U);
@@ -124,9 +127,7 @@ BOOST_AUTO_TEST_CASE(a_node_that_leaves_is_known_by_nobody_after_a_second) {
 }
 
 BOOST_AUTO_TEST_CASE(nodes_that_crash_and_begin_again_are_found_without_a_clash) {
-    gossip_network net{9};
-    net.start(some, 1s);
-    net.pass(10s);
+    running_network net{9};
     for (std::size_t i = 0; i < some; i += 3) {
         net.restart(i); // including seeds
         net.pass(100ms);
@@ -137,9 +138,7 @@ BOOST_AUTO_TEST_CASE(nodes_that_crash_and_begin_again_are_found_without_a_clash)
 }
 
 BOOST_AUTO_TEST_CASE(a_network_whose_seeds_have_died_goes_on) {
-    gossip_network net{10};
-    net.start(30, 1s, 2);
-    net.pass(10s);
+    running_network net{10, 30, 2};
     net.kill(0);
     net.kill(1);
     net.pass(30s);
@@ -148,9 +147,7 @@ BOOST_AUTO_TEST_CASE(a_network_whose_seeds_have_died_goes_on) {
 }
 
 BOOST_AUTO_TEST_CASE(clocks_that_jump_and_processes_that_were_stopped_for_long_harm_nobody) {
-    gossip_network net{11};
-    net.start(30, 1s);
-    net.pass(10s);
+    running_network net{11, 30};
     net.forget_verdicts();
     for (std::size_t i = 0; i < 30; i += 5) {
         net.jump(i, 10min);
@@ -166,9 +163,7 @@ BOOST_AUTO_TEST_CASE(clocks_that_jump_and_processes_that_were_stopped_for_long_h
 }
 
 BOOST_AUTO_TEST_CASE(a_node_that_was_stopped_for_longer_than_it_is_remembered_comes_back) {
-    gossip_network net{12};
-    net.start(30, 1s);
-    net.pass(10s);
+    running_network net{12, 30};
     net.pause(20, 60s);
     net.pass(50s);
     BOOST_TEST(net.holding(20) == 0U);
@@ -180,9 +175,7 @@ BOOST_AUTO_TEST_CASE(a_node_that_was_stopped_for_longer_than_it_is_remembered_co
 }
 
 BOOST_AUTO_TEST_CASE(what_waits_to_be_read_is_bounded) {
-    gossip_network net{13};
-    net.start(some, 1s);
-    net.pass(10s);
+    running_network net{13};
     net.pause(3, 30s);
     net.pass(40s);
     // Each node that asks it gives up, and asks another one.
@@ -192,9 +185,7 @@ BOOST_AUTO_TEST_CASE(what_waits_to_be_read_is_bounded) {
 // The checks above can detect failures.
 
 BOOST_AUTO_TEST_CASE(a_jump_that_is_not_noticed_is_found) {
-    gossip_network net{11, {}, planted::excuse_forgotten};
-    net.start(some, 1s);
-    net.pass(10s);
+    running_network net{11, some, 3, planted::excuse_forgotten};
     net.jump(0, 10min);
     BOOST_TEST(net.false_deaths() > 0U);
 }

@@ -5,6 +5,7 @@
 #include <cles/routing.hpp>
 
 #include "node/membership/gossip.hpp"
+#include "simulation/world/ledger.hpp"
 #include "simulation/world/node_hosts.hpp"
 #if CLES_SIMULATION_SECURED
 #include "simulation/secured/host_security.hpp"
@@ -13,9 +14,9 @@
 #endif
 
 #include <algorithm>
-#include <map>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -58,10 +59,7 @@ class mesh final : public node_hosts {
     mesh_report live() {
         report_.converged = pass_until_shortest();
         measure_traffic();
-        for (unsigned i = 0; i < setup_.requests; ++i) {
-            ask_anyone(any_host());
-        }
-        pass(until_answered);
+        ask_many(setup_.requests);
         for (unsigned i = 0; i < setup_.cuts; ++i) {
             lose_a_link();
         }
@@ -75,15 +73,6 @@ class mesh final : public node_hosts {
     }
 
   private:
-    struct asked {
-        bool vital = false; ///< has to succeed
-        bool too_far = false;
-        int ends = 0;
-        bool succeeded = false;
-        std::string why{};
-        int ran = 0;
-    };
-
     void start(unsigned host) override {
         std::vector<std::string> seeds;
         std::vector<std::string> names;
@@ -99,7 +88,7 @@ class mesh final : public node_hosts {
                               .gossip = cles::gossip(seeds, states_links() ? names : std::vector<std::string>{})});
         nodes_[host] = n;
         const auto serve = [this](const request& r, const std::shared_ptr<core::call>& c) {
-            ++asked_.at(r.parameter<std::uint32_t>(0)).ran;
+            requests_.note_run(r.parameter<std::uint32_t>(0));
             c->done("{}");
         };
         n->node()->tasks.add(verb::delegate, "work", {.start = serve});
@@ -211,10 +200,7 @@ class mesh final : public node_hosts {
                                                     " found no other way in " + std::to_string(first.count()) + " ms");
         }
         pass_until_rerouted(cut, begun);
-        for (unsigned i = 0; i < setup_.requests / 4; ++i) {
-            ask_anyone(any_host());
-        }
-        pass(until_answered);
+        ask_many(setup_.requests / 4);
         pass_until_shortest();
     }
 
@@ -297,7 +283,7 @@ class mesh final : public node_hosts {
         while (time_.now() < until) {
             sent.push_back(ask(a, b, false));
             pass(milliseconds{20});
-            if (std::ranges::any_of(sent, [&](auto op) { return asked_.at(op).succeeded; })) {
+            if (std::ranges::any_of(sent, [&](auto op) { return requests_.of(op).succeeded; })) {
                 break;
             }
         }
@@ -331,10 +317,7 @@ class mesh final : public node_hosts {
         }
         pass(seconds{5});
         pass_until_shortest();
-        for (unsigned i = 0; i < setup_.requests / 4; ++i) {
-            ask_anyone(any_host());
-        }
-        pass(until_answered);
+        ask_many(setup_.requests / 4);
     }
 
     // -- requests --------------------------------------------------------------------------------------------------
@@ -348,14 +331,21 @@ class mesh final : public node_hosts {
         }
     }
 
-    // It has to succeed.
-    void ask_anyone(unsigned from) { ask(from, any_other_than(from), true); }
+    // All of which have to succeed.
+    void ask_many(unsigned count) {
+        for (; count != 0; --count) {
+            const auto from = any_host();
+            ask(from, any_other_than(from), true);
+        }
+        pass(until_answered);
+    }
 
     std::uint32_t ask(unsigned from, unsigned to, bool vital) {
-        const auto op = ++last_op_;
-        auto& a = asked_[op];
-        a.vital = vital;
-        a.too_far = links_.distances(from)[to].value_or(0) > setup_.hops + 1;
+        const bool too_far = links_.distances(from)[to].value_or(0) > setup_.hops + 1;
+        const auto op = requests_.add({.vital = vital && !too_far, .deadline = time_.now() + request_limit});
+        if (vital && too_far) {
+            too_far_.push_back(op);
+        }
         auto& n = *node(from);
         n.run([&] {
             n.ask(to, carrier::name,
@@ -363,38 +353,20 @@ class mesh final : public node_hosts {
                    .noun = mesh_name(to) + ":work/" + std::to_string(op),
                    .deadline = request_limit,
                    .hops = setup_.hops},
-                  when_ended(
-                      [&a](std::string_view) {
-                          ++a.ends;
-                          a.succeeded = true;
-                      },
-                      [&a](errc, std::string_view why) {
-                          ++a.ends;
-                          a.why = why;
-                      }));
+                  requests_.operation(op));
         });
         return op;
     }
 
     void judge_requests() {
-        for (const auto& [op, a] : asked_) {
-            const auto request = "request " + std::to_string(op);
-            if (a.ends != 1) {
-                watcher_.broken(rule::ends_in_time, request + " ended " + std::to_string(a.ends) + " times");
+        requests_.judge();
+        for (const auto op : too_far_) {
+            const auto& why = requests_.of(op).why;
+            if (why.find("permits no more: state hops=") == std::string::npos) {
+                requests_.complain(rule::replies_match, op, "went too far, or its failure does not say so: " + why);
             }
-            if (a.ran > 1) {
-                watcher_.broken(rule::effects_once, request + " ran " + std::to_string(a.ran) + " times");
-            }
-            if (a.vital && !a.too_far && !a.succeeded) {
-                watcher_.broken(rule::asks_succeed, request + " failed: " + a.why);
-            }
-            if (a.vital && a.too_far && a.why.find("permits no more: state hops=") == std::string::npos) {
-                watcher_.broken(rule::replies_match,
-                                request + " went too far, or its failure does not say so: " + a.why);
-            }
-            ++report_.asked;
-            report_.answered += a.succeeded ? 1 : 0;
         }
+        report_.requests = requests_.tally();
     }
 
     // The address of a link's other end shows its host.
@@ -420,13 +392,22 @@ class mesh final : public node_hosts {
     std::optional<virtual_fleet> fleet_;
 #endif
     unsigned next_checked_ = 0;
-    std::map<std::uint32_t, asked> asked_;
-    std::uint32_t last_op_ = 0;
+    ledger requests_{watcher_, time_};
+    std::vector<std::uint32_t> too_far_; // requests over more links than they may be forwarded
     unsigned runs_ = 0;
     mesh_report report_;
 };
 
 } // namespace
+
+std::string to_text(const mesh_report& r) {
+    std::ostringstream out;
+    out << "shortest routes after " << r.converged.count() << " ms, another way after " << r.rerouted.count()
+        << " ms at most, for all of " << r.cut << " pairs after " << r.all_rerouted.count()
+        << " ms; requests: " << to_text(r.requests) << ", over " << r.longest << " links at most; a node receives "
+        << r.bytes << " bytes in an interval, " << r.bytes_of_routes << " of routes";
+    return out.str();
+}
 
 mesh_report simulate_mesh(std::uint64_t seed, const mesh_setup& setup, planted fault) {
     return mesh{seed, setup, fault}.live();

@@ -3,11 +3,12 @@
 
 #include "simulation/network/graph.hpp"
 #include "simulation/network/planted.hpp"
-#include "simulation/world/witness.hpp"
+#include "simulation/world/work_report.hpp"
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 namespace cles::simulation {
@@ -34,10 +35,12 @@ struct mesh_report {
     std::size_t cut = 0;                       ///< how many these were
     std::uint64_t bytes = 0;                   ///< received by a node in an interval without changes, on average
     std::uint64_t bytes_of_routes = 0;         ///< among them
-    std::size_t asked = 0;
-    std::size_t answered = 0;
+    request_tally requests{};
     unsigned longest = 0; ///< route, in links
 };
+
+/// In one line.
+std::string to_text(const mesh_report& r);
 
 /// Simulates nodes that route for each other in virtual time, where most have no link to each other. The routes have to
 /// become the shortest ones. Then links are lost silently and nodes crash; requests have to find another way

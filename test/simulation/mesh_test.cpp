@@ -19,14 +19,9 @@ namespace {
 
 void hold(std::uint64_t seed, const mesh_setup& setup) {
     const auto r = simulate_mesh(seed, setup);
-    for (const auto& v : r.violations) {
-        BOOST_ERROR("seed " << seed << ": " << to_string(v.broken) << ": " << v.what);
-    }
-    BOOST_TEST(r.answered != 0U);
-    BOOST_TEST_MESSAGE("seed " << seed << ": converged in " << r.converged.count() << " ms, rerouted in "
-                               << r.rerouted.count() << " ms, all " << r.cut << " pairs in " << r.all_rerouted.count()
-                               << " ms, longest route " << r.longest << ", " << r.answered << " of " << r.asked
-                               << " answered");
+    expect_none(r.violations, "seed " + std::to_string(seed));
+    BOOST_TEST(r.requests.succeeded != 0U);
+    BOOST_TEST_MESSAGE("seed " << seed << ": " << to_text(r));
 }
 
 /// A line with this fault violates that rule, perhaps others too.

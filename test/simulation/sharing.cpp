@@ -6,14 +6,16 @@
 
 #include "node/membership/gossip.hpp"
 #include "simulation/network/graph.hpp"
-#include "simulation/world/node_hosts.hpp"
-#include "simulation/world/work_pool.hpp"
+#include "simulation/world/daemon_hosts.hpp"
 
 #include <algorithm>
 #include <chrono>
+#include <map>
 #include <memory>
 #include <set>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace cles::simulation {
 namespace {
@@ -33,10 +35,10 @@ constexpr milliseconds until_ended{5000}; // longer than any job takes
 constexpr milliseconds drain_limit{1000};
 constexpr milliseconds close_limit{500};
 
-class sharing_mesh final : public node_hosts {
+class sharing_mesh final : public daemon_hosts {
   public:
     sharing_mesh(std::uint64_t seed, const sharing_setup& setup, planted fault)
-        : node_hosts(seed, fault), setup_(setup),
+        : daemon_hosts(seed, fault, most_queued), setup_(setup),
           links_(graph::of(mesh_form::random, setup.nodes, setup.mean_degree, chance_)) {
         for (unsigned host = 0; host < setup.nodes; ++host) {
             start(host);
@@ -52,30 +54,21 @@ class sharing_mesh final : public node_hosts {
             }
             start(setup.nodes + i);
         }
-        time_.watch([this] {
-            const auto host = static_cast<unsigned>(time_.steps() / 64 % setup_.nodes);
-            if (node(host) != nullptr) {
-                node(host)->check_bounds();
-                pools_.at(host)->check();
-            }
-        });
+        time_.watch([this] { check_next(setup_.nodes); });
     }
-    sharing_mesh(const sharing_mesh&) = delete;
-    sharing_mesh& operator=(const sharing_mesh&) = delete;
-    ~sharing_mesh() { end_all(); }
 
-    sharing_report live() {
+    work_report live() {
         const auto begun = time_.now();
         pass(until_found);
         if (setup_.faults_per_minute != 0) {
             net_.set({.lost = 5, .doubled = 5, .late = 5});
             time_.at(time_.now(), [this] { go_wrong(); });
         }
-        for (bool whole = true; jobs_.size() < setup_.jobs;) {
+        for (bool whole = true; requests_.size() < setup_.jobs;) {
             const auto burst = chance_.chance(200) ? chance_.between(2, most_in_burst) : 1;
             submit_burst(burst, false);
             time_.run_until(time_.now() + burst * microseconds{1'000'000 / (jobs_per_second * setup_.nodes)});
-            if (setup_.faults_per_minute != 0 && whole && jobs_.size() > setup_.jobs / 2) {
+            if (setup_.faults_per_minute != 0 && whole && requests_.size() > setup_.jobs / 2) {
                 whole = false;
                 cut_in_two();
             }
@@ -89,8 +82,9 @@ class sharing_mesh final : public node_hosts {
             pass(milliseconds{30});
         }
         pass(vital_deadline + seconds{1});
-        judge_jobs();
+        requests_.judge();
         judge_rest();
+        report_.jobs = requests_.tally();
         report_.seconds = std::chrono::duration<double>(time_.now() - begun).count();
         report_.violations = watcher_.violations();
         return report_;
@@ -100,16 +94,6 @@ class sharing_mesh final : public node_hosts {
     struct client {
         unsigned entry = 0;
         carrier by = carrier::stream;
-    };
-    struct job {
-        bool vital = false;      ///< has to succeed
-        bool may_repeat = false; ///< a node that chooses may repeat it once
-        time_point deadline{};
-        int ends = 0;
-        bool succeeded = false;
-        errc code{};
-        int ran = 0; ///< the number of executions, on any node
-        std::string why{};
     };
 
     // -- nodes -----------------------------------------------------------------------------------------------------
@@ -124,7 +108,7 @@ class sharing_mesh final : public node_hosts {
                 seeds.push_back(net_.url_of(other, carrier::stream));
                 names.push_back(mesh_name(other));
             }
-            how.load = [this, host] { return pools_.at(host)->load(); };
+            how.load = [this, host] { return pool_of(host).load(); };
             how.routing = cles::routing();
             how.gossip = cles::gossip(seeds, names);
         }
@@ -132,44 +116,18 @@ class sharing_mesh final : public node_hosts {
             net_, host, ++runs_[host], is_client ? "client" + std::to_string(host) : mesh_name(host), std::move(how));
         nodes_[host] = n;
         if (!is_client) {
-            const auto pool = std::make_shared<work_pool>(*n, most_queued);
-            pools_[host] = pool;
-            pool->share();
-            offer(*n, pool, "once", false);
-            offer(*n, pool, "again", true);
+            add_pool(*n, true);
+            offer(*n, verb::delegate, "once", false);
+            offer(*n, verb::delegate, "again", true);
         }
         n->start();
     }
 
-    void offer(node_run& n, const std::shared_ptr<work_pool>& pool, const char* task, bool idempotent) {
-        n.node()->tasks.add(verb::delegate, task,
-                            {.info = {.idempotent = idempotent},
-                             .start = [this, pool](const request& r, const std::shared_ptr<core::call>& c) {
-                                 const auto op = r.parameter<std::uint32_t>(0);
-                                 if (r.body() != body_of(op)) {
-                                     complain(rule::replies_match, op, "came with the body of another");
-                                 }
-                                 pool->submit({.requester = r.parameter<std::uint64_t>(2),
-                                               .answer = c,
-                                               .work = milliseconds{r.parameter<unsigned>(1)},
-                                               .heeds = op % 64 != 0,
-                                               .body = std::string{r.body()},
-                                               .begun = [this, op] { ++jobs_.at(op).ran; }});
-                             }});
-    }
-
-    void end_run(node_run& n) override {
-        if (const auto pool = pools_.find(n.host()); pool != pools_.end()) {
-            count(n, *pool->second);
-            pool->second->crash();
+    work_pool::order order_of(const request& r, std::uint32_t op) override {
+        if (r.body() != body_of(op)) {
+            requests_.complain(rule::replies_match, op, "came with the body of another");
         }
-        n.crash();
-    }
-
-    void count(node_run& n, const work_pool& pool) {
-        report_.moved += pool.sent() - pool.returned();
-        report_.returned += pool.returned();
-        report_.grants += n.node()->counts.grants_sent;
+        return {.requester = r.parameter<std::uint64_t>(2), .heeds = op % 64 != 0, .body = std::string{r.body()}};
     }
 
     // -- faults ----------------------------------------------------------------------------------------------------
@@ -201,13 +159,13 @@ class sharing_mesh final : public node_hosts {
         case 6: freeze(host, span); break;
         default: jump(host, span);
         }
-        time_.at(time_.now() + chance_.within(microseconds{120'000'000} / (setup_.faults_per_minute * setup_.nodes)),
-                 [this] { go_wrong(); });
+        time_.later(chance_.within(microseconds{120'000'000} / (setup_.faults_per_minute * setup_.nodes)),
+                    [this] { go_wrong(); });
     }
 
     void stop_in_order(unsigned host, milliseconds down) {
         auto* n = node(host);
-        if (n == nullptr || n->frozen() || pools_.at(host)->draining() || steady_.contains(host)) {
+        if (n == nullptr || n->frozen() || pool_of(host).draining() || steady_.contains(host)) {
             return;
         }
         watcher_.saw(n->name(), "leaves in order");
@@ -217,7 +175,7 @@ class sharing_mesh final : public node_hosts {
                 time_.at(time_.now(), [this, host, down] { end_node(host, down); });
             }
         };
-        pools_.at(host)->drain(
+        pool_of(host).drain(
             drain_limit, [n, end] { n->local().close(close_limit, when_ended([end](std::string_view) { end(); })); });
     }
 
@@ -283,76 +241,25 @@ class sharing_mesh final : public node_hosts {
     }
 
     void submit(unsigned by_client, const std::string& target, bool vital) {
-        const auto op = static_cast<std::uint32_t>(jobs_.size());
         const bool again = chance_.chance(500);
         const auto work = vital ? 10U : chance_.chance(2) ? chance_.between(200, 2000) : chance_.between(1, 24);
         const auto limit = vital ? vital_deadline : milliseconds{chance_.between(50, 4000)};
-        jobs_.push_back({.vital = vital, .may_repeat = again && target == "any", .deadline = time_.now() + limit});
+        const auto op = requests_.add({.most_runs = again && target == "any" ? 2U : 1U, // it may be repeated once
+                                       .vital = vital,
+                                       .deadline = time_.now() + limit});
         const auto noun = target + (again ? ":again/" : ":once/") + std::to_string(op) + "/" + std::to_string(work) +
                           "/" + std::to_string(by_client);
         const auto& [entry, by] = clients_[by_client];
         auto& n = *node(setup_.nodes + by_client);
         const auto ticket =
             n.ask(entry, by, {.verb = verb::delegate, .noun = noun, .body = body_of(op), .deadline = limit},
-                  when_ended([this, op](std::string_view) { end(op).succeeded = true; },
-                             [this, op](errc code, std::string_view why) {
-                                 end(op).code = code;
-                                 jobs_[op].why = why;
-                             }));
+                  requests_.operation(op));
         if (!vital && chance_.chance(30)) {
             n.later(chance_.within(milliseconds{100}), [&n, ticket] { n.cancel(ticket); });
         }
     }
 
-    job& end(std::uint32_t op) {
-        auto& j = jobs_[op];
-        if (++j.ends != 1) {
-            complain(rule::ends_in_time, op, "ended again");
-        }
-        if (time_.now() > j.deadline) {
-            complain(rule::ends_in_time, op, "ended after its deadline");
-        }
-        return j;
-    }
-
     // -- checks ----------------------------------------------------------------------------------------------------
-
-    void complain(rule which, std::uint32_t op, const std::string& what) {
-        watcher_.broken(which, "job " + std::to_string(op) + " " + what);
-    }
-
-    // Whether the reply says that the job has not run.
-    static bool denies_run(errc code) {
-        return code == errc::busy || code == errc::no_target || code == errc::no_task || code == errc::denied ||
-               code == errc::bad_request;
-    }
-
-    void judge_jobs() {
-        report_.jobs = jobs_.size();
-        for (std::uint32_t op = 0; op < jobs_.size(); ++op) {
-            const auto& j = jobs_[op];
-            if (j.ends == 0) {
-                complain(rule::ends_in_time, op, "has not ended");
-            }
-            if (j.ran > (j.may_repeat ? 2 : 1)) {
-                complain(rule::effects_once, op, "ran " + std::to_string(j.ran) + " times");
-            }
-            if (j.succeeded && j.ran == 0) {
-                complain(rule::replies_match, op, "succeeded and had not run");
-            }
-            if (!j.succeeded && denies_run(j.code) && j.ran != 0) {
-                complain(rule::replies_match, op, "ran, and was refused: " + j.why);
-            }
-            if (j.vital && !j.succeeded) {
-                complain(rule::asks_succeed, op, "fails though all is well: " + j.why);
-            }
-            if (j.succeeded) {
-                ++report_.succeeded;
-            } else {
-                ++report_.failed[std::string{wire_name(j.code)}];
-            }
-        }
-    }
 
     // Nodes that gossip are never at rest, but nothing is left of the jobs, and nobody grants anything.
     void judge_rest() {
@@ -366,8 +273,8 @@ class sharing_mesh final : public node_hosts {
                                                    " handlers that run and " + std::to_string(counts.routed) +
                                                    " requests that other nodes serve");
             }
-            pools_.at(host)->check_rest();
-            count(n, *pools_.at(host));
+            pool_of(host).check_rest();
+            count(n);
         }
         pass(seconds{2});
         for (const auto& [host, sent] : grants) {
@@ -383,16 +290,13 @@ class sharing_mesh final : public node_hosts {
     std::vector<client> clients_;
     // Hosts to which clients send datagrams. They run on: one that restarts cannot know which requests it has served.
     std::set<unsigned> steady_;
-    std::map<unsigned, std::shared_ptr<work_pool>> pools_;
     std::map<unsigned, unsigned> runs_;
-    std::vector<job> jobs_;
     bool over_ = false; // nothing goes wrong any more
-    sharing_report report_;
 };
 
 } // namespace
 
-sharing_report simulate_sharing(std::uint64_t seed, const sharing_setup& setup, planted fault) {
+work_report simulate_sharing(std::uint64_t seed, const sharing_setup& setup, planted fault) {
     return sharing_mesh{seed, setup, fault}.live();
 }
 

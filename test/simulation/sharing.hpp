@@ -2,13 +2,9 @@
 #pragma once
 
 #include "simulation/network/planted.hpp"
-#include "simulation/world/witness.hpp"
+#include "simulation/world/work_report.hpp"
 
-#include <cstddef>
 #include <cstdint>
-#include <map>
-#include <string>
-#include <vector>
 
 namespace cles::simulation {
 
@@ -21,24 +17,11 @@ struct sharing_setup {
     unsigned faults_per_minute = 6; ///< for each node; 0: nothing goes wrong
 };
 
-/// The result of a simulated mesh whose nodes share their jobs.
-struct sharing_report {
-    std::vector<violation> violations;
-    std::size_t jobs = 0;
-    std::size_t succeeded = 0;
-    std::map<std::string, std::size_t> failed; ///< by code
-    std::size_t moved = 0;                     ///< sent to other nodes, and not returned
-    std::size_t returned = 0;                  ///< refused by other nodes
-    std::size_t grants = 0;                    ///< of nodes, at the end
-    std::size_t faults = 0;                    ///< that befell nodes and links
-    double seconds = 0;                        ///< of virtual time
-};
-
 /// Simulates nodes that share their jobs in virtual time. Most have no link to each other. Clients submit jobs, by name
 /// and to `any`, most of them in bursts to a few nodes, by streams and by datagrams; they cancel some. Meanwhile nodes
 /// crash, stop in order, are suspended and restart, links are lost, datagrams are lost, and the mesh is cut in two. No
 /// job may run twice, each has to end in time as its reply says, and no pool may exceed its limits. When the faults
 /// have ended, jobs have to succeed; when all jobs have ended, nothing may be left.
-sharing_report simulate_sharing(std::uint64_t seed, const sharing_setup& setup, planted fault = planted::none);
+work_report simulate_sharing(std::uint64_t seed, const sharing_setup& setup, planted fault = planted::none);
 
 } // namespace cles::simulation

@@ -21,7 +21,7 @@ namespace cles::security {
 
 /// The security of a node, from its directory: its key, the roster in force, the local rules, and what it seals. It
 /// stores newer rosters there, and notices when somebody else changes the rules or adds a roster.
-class secured_node final : public core::node_security {
+class secured_node : public core::node_security {
   public:
     /// How often the files are looked at.
     static constexpr std::chrono::seconds check_interval{1};

@@ -16,7 +16,6 @@
 #include <exception>
 #include <iomanip>
 #include <iostream>
-#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,11 +26,48 @@ using namespace cles::simulation;
 using namespace std::chrono_literals;
 using std::chrono::milliseconds;
 
+/// The seeds to simulate.
+struct seed_range {
+    std::uint64_t first = 1;
+    std::uint64_t count = 1;
+};
+
+/// Whether there are none.
+bool print(const std::string& run, const std::vector<violation>& all) {
+    for (const auto& v : all) {
+        std::cout << run << ": " << to_string(v.broken) << ": " << v.what << '\n';
+    }
+    return all.empty();
+}
+
+int print_failed(std::uint64_t failed, std::uint64_t of) {
+    std::cout << failed << " of " << of << " failed\n";
+    return failed == 0 ? 0 : 1;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point begun) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+}
+
+/// Runs a simulation with each seed, and prints its report.
+template <class Simulation>
+int run_seeds(const seed_range& seeds, Simulation simulate) {
+    std::uint64_t failed = 0;
+    for (auto seed = seeds.first; seed < seeds.first + seeds.count; ++seed) {
+        const auto begun = std::chrono::steady_clock::now();
+        const auto r = simulate(seed);
+        const auto run = "seed " + std::to_string(seed);
+        failed += print(run, r.violations) ? 0 : 1;
+        std::cout << run << ": " << to_text(r) << "; took " << std::fixed << std::setprecision(1)
+                  << seconds_since(begun) << " s" << std::endl;
+    }
+    return print_failed(failed, seeds.count);
+}
+
 // -- seeds and plans -----------------------------------------------------------------------------------------------
 
 struct options {
-    std::uint64_t seed = 1;
-    std::uint64_t seeds = 1;
+    seed_range seeds{};
     unsigned steps = 300;
     bool secured = false;
     bool twice = false;
@@ -59,15 +95,13 @@ bool live_through(const plan& p, const std::string& name, const options& o, repo
     sum.updates += r.updates;
     sum.datagrams += r.datagrams;
     sum.steps += r.steps;
-    for (const auto& v : r.violations) {
-        std::cout << name << ": " << to_string(v.broken) << ": " << v.what << '\n';
-    }
-    if (!r.violations.empty() && o.minimise) {
+    const bool good = print(name, r.violations);
+    if (!good && o.minimise) {
         const auto& first = r.violations.front();
         std::cout << "# " << to_string(first.broken) << ": " << first.what << '\n'
                   << to_text(minimise(p, first.broken, o.fault));
     }
-    return r.violations.empty();
+    return good;
 }
 
 int run(const options& o) {
@@ -77,77 +111,16 @@ int run(const options& o) {
     for (const auto& path : o.files) {
         failed += live_through(plan_in_file(path), path, o, sum) ? 0 : 1;
     }
-    for (std::uint64_t i = 0; o.files.empty() && i < o.seeds; ++i) {
-        const auto seed = o.seed + i;
+    for (std::uint64_t i = 0; o.files.empty() && i < o.seeds.count; ++i) {
+        const auto seed = o.seeds.first + i;
         failed += live_through(make_plan(seed, o.steps, o.secured), "seed " + std::to_string(seed), o, sum) ? 0 : 1;
     }
-    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begun;
     if (o.bench) {
         std::cout << std::fixed << std::setprecision(0) << sum.node_seconds << " node-seconds with " << sum.requests
                   << " requests, " << sum.updates << " updates, " << sum.datagrams << " datagrams, " << sum.steps
-                  << " events in " << std::setprecision(2) << took.count() << " s\n";
+                  << " events in " << std::setprecision(2) << seconds_since(begun) << " s\n";
     }
-    if (!o.print) {
-        std::cout << failed << " of " << (o.files.empty() ? o.seeds : o.files.size()) << " failed\n";
-    }
-    return failed == 0 ? 0 : 1;
-}
-
-// -- meshes --------------------------------------------------------------------------------------------------------
-
-struct mesh_options {
-    std::uint64_t seed = 1;
-    std::uint64_t seeds = 10;
-    mesh_setup setup{.nodes = 40};
-};
-
-int simulate_meshes(const mesh_options& o) {
-    std::uint64_t failed = 0;
-    for (auto seed = o.seed; seed < o.seed + o.seeds; ++seed) {
-        const auto r = simulate_mesh(seed, o.setup);
-        for (const auto& v : r.violations) {
-            std::cout << "seed " << seed << ": " << to_string(v.broken) << ": " << v.what << '\n';
-        }
-        failed += r.violations.empty() ? 0 : 1;
-        std::cout << "seed " << seed << ": shortest routes after " << r.converged.count() << " ms, another way after "
-                  << r.rerouted.count() << " ms at most, for all of " << r.cut << " pairs after "
-                  << r.all_rerouted.count() << " ms, " << r.answered << " of " << r.asked << " requests answered, over "
-                  << r.longest << " links at most; a node receives " << r.bytes << " bytes in an interval, "
-                  << r.bytes_of_routes << " of routes" << std::endl;
-    }
-    std::cout << failed << " of " << o.seeds << " failed\n";
-    return failed == 0 ? 0 : 1;
-}
-
-// -- sharing -------------------------------------------------------------------------------------------------------
-
-struct sharing_options {
-    std::uint64_t seed = 1;
-    std::uint64_t seeds = 1;
-    sharing_setup setup{};
-};
-
-int simulate_shared_work(const sharing_options& o, planted fault) {
-    std::uint64_t failed = 0;
-    for (auto seed = o.seed; seed < o.seed + o.seeds; ++seed) {
-        const auto begun = std::chrono::steady_clock::now();
-        const auto r = simulate_sharing(seed, o.setup, fault);
-        const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begun;
-        for (const auto& v : r.violations) {
-            std::cout << "seed " << seed << ": " << to_string(v.broken) << ": " << v.what << '\n';
-        }
-        failed += r.violations.empty() ? 0 : 1;
-        std::cout << "seed " << seed << ": " << r.jobs << " jobs, " << r.succeeded << " succeeded";
-        for (const auto& [code, count] : r.failed) {
-            std::cout << ", " << count << ' ' << code;
-        }
-        std::cout << "; " << r.moved << " moved, " << r.returned << " returned, " << r.grants << " grants; " << r.faults
-                  << " faults; " << std::fixed << std::setprecision(1) << r.seconds << " s in " << took.count()
-                  << " s\n";
-        std::cout.flush();
-    }
-    std::cout << failed << " of " << o.seeds << " failed\n";
-    return failed == 0 ? 0 : 1;
+    return o.print ? 0 : print_failed(failed, o.files.empty() ? o.seeds.count : o.files.size());
 }
 
 // -- gossip --------------------------------------------------------------------------------------------------------
@@ -237,76 +210,91 @@ int measure_gossip(const gossip_options& o) {
     return breaches == 0 ? 0 : 1;
 }
 
+// -- options -------------------------------------------------------------------------------------------------------
+
+void add_seeds(CLI::App& to, seed_range& seeds) {
+    to.add_option("--seed", seeds.first, "The first seed");
+    to.add_option("--seeds", seeds.count, "How many");
+}
+
+void add_mesh(CLI::App& to, unsigned& nodes, unsigned& mean_degree) {
+    to.add_option("--nodes", nodes, "How many")->check(CLI::Range(2, 5000));
+    to.add_option("--degree", mean_degree, "The mean number of links of a node")->check(CLI::Range(2, 16));
+}
+
+/// An option whose values are the names of an enumeration.
+template <class Enum>
+void add_choice(CLI::App& to, const std::string& option, Enum& chosen, const std::string& text) {
+    to.add_option_function<std::string>(
+        option,
+        [option, &chosen](const std::string& name) {
+            if (!boost::describe::enum_from_string(name.c_str(), chosen)) {
+                throw CLI::ValidationError{option, "there is no '" + name + "'"};
+            }
+        },
+        text);
+}
+
 } // namespace
 
 int main(int argc, char** argv) {
     CLI::App program{"Simulates nodes and their network in virtual time."};
+    program.option_defaults()->always_capture_default();
     options given;
-    program.add_option("--seed", given.seed, "The first seed")->capture_default_str();
-    program.add_option("--seeds", given.seeds, "How many")->capture_default_str();
-    program.add_option("--steps", given.steps, "What happens in each from the outside")->capture_default_str();
+    add_seeds(program, given.seeds);
+    program.add_option("--steps", given.steps, "What happens in each from the outside");
     program.add_flag("--secured", given.secured, "Nodes with security, whose roster changes, and an attacker");
     program.add_flag("--twice", given.twice, "Each twice, to see that both are the same");
     program.add_flag("--trace", given.trace, "Tells all that happens");
     program.add_flag("--minimise", given.minimise, "Makes a plan that fails smaller, and prints it");
     program.add_flag("--plan", given.print, "Prints the plans and simulates nothing");
-    program.add_option_function<std::string>(
-        "--plant",
-        [&given](const std::string& name) {
-            if (!boost::describe::enum_from_string(name.c_str(), given.fault)) {
-                throw CLI::ValidationError{"--plant", "there is no such fault to plant"};
-            }
-        },
-        "With this fault planted");
+    add_choice(program, "--plant", given.fault, "With this fault planted");
     program.add_flag("--bench", given.bench, "Tells how much was simulated");
     program.add_option("files", given.files, "Plans in files, instead of seeds");
-    gossip_options many;
-    mesh_options sparse;
+
     auto* mesh = program.add_subcommand("mesh", "Simulates nodes that reach each other through others");
-    mesh->add_option("--nodes", sparse.setup.nodes, "How many")->capture_default_str()->check(CLI::Range(2, 5000));
-    mesh->add_option("--degree", sparse.setup.mean_degree, "The mean number of links of a node")
-        ->capture_default_str()
-        ->check(CLI::Range(2, 16));
-    mesh->add_option("--form", sparse.setup.form, "random, line, ring, star or grid")
-        ->transform(CLI::CheckedTransformer(std::map<std::string, mesh_form>{{"random", mesh_form::random},
-                                                                             {"line", mesh_form::line},
-                                                                             {"ring", mesh_form::ring},
-                                                                             {"star", mesh_form::star},
-                                                                             {"grid", mesh_form::grid}}));
-    mesh->add_option("--cuts", sparse.setup.cuts, "Links that are lost")->capture_default_str();
-    mesh->add_option("--crashes", sparse.setup.crashes, "Nodes that crash")->capture_default_str();
-    mesh->add_option("--requests", sparse.setup.requests, "After each change")->capture_default_str();
-    mesh->add_flag("!--undeclared", sparse.setup.declared, "The nodes have to find out which links there are");
-    mesh->add_option("--hops", sparse.setup.hops, "How many nodes may forward a request")->capture_default_str();
-    mesh->add_flag("--secured", sparse.setup.secured, "The nodes are members of a fleet");
-    mesh->add_option("--seed", sparse.seed, "The first")->capture_default_str();
-    mesh->add_option("--seeds", sparse.seeds, "How many")->capture_default_str();
-    sharing_options shared;
+    mesh_setup sparse{.nodes = 40};
+    seed_range mesh_seeds{.count = 10};
+    add_seeds(*mesh, mesh_seeds);
+    add_mesh(*mesh, sparse.nodes, sparse.mean_degree);
+    add_choice(*mesh, "--form", sparse.form, "random, line, ring, star or grid");
+    mesh->add_option("--cuts", sparse.cuts, "Links that are lost");
+    mesh->add_option("--crashes", sparse.crashes, "Nodes that crash");
+    mesh->add_option("--requests", sparse.requests, "After each change");
+    mesh->add_flag("!--undeclared", sparse.declared, "The nodes have to find out which links there are");
+    mesh->add_option("--hops", sparse.hops, "How many nodes may forward a request");
+    mesh->add_flag("--secured", sparse.secured, "The nodes are members of a fleet");
+
     auto* sharing = program.add_subcommand("sharing", "Simulates nodes that share their jobs");
-    sharing->add_option("--nodes", shared.setup.nodes, "How many")->capture_default_str()->check(CLI::Range(2, 5000));
-    sharing->add_option("--degree", shared.setup.mean_degree, "The mean number of links of a node")
-        ->capture_default_str()
-        ->check(CLI::Range(2, 16));
-    sharing->add_option("--clients", shared.setup.clients, "That submit jobs")->capture_default_str();
-    sharing->add_option("--jobs", shared.setup.jobs, "In all")->capture_default_str();
-    sharing->add_option("--faults", shared.setup.faults_per_minute, "For each node in a minute")->capture_default_str();
-    sharing->add_option("--seed", shared.seed, "The first")->capture_default_str();
-    sharing->add_option("--seeds", shared.seeds, "How many")->capture_default_str();
+    sharing_setup shared;
+    seed_range sharing_seeds;
+    add_seeds(*sharing, sharing_seeds);
+    add_mesh(*sharing, shared.nodes, shared.mean_degree);
+    sharing->add_option("--clients", shared.clients, "That submit jobs");
+    sharing->add_option("--jobs", shared.jobs, "In all");
+    sharing->add_option("--faults", shared.faults_per_minute, "For each node in a minute");
+
     auto* gossip = program.add_subcommand("gossip", "Measures gossip among many nodes");
-    gossip->add_option("--nodes", many.nodes, "How many")->capture_default_str();
-    gossip
-        ->add_option("--minutes", many.minutes,
-                     "How long, with 5 % of packets lost and each process stopped for 2 % of the time")
-        ->capture_default_str();
-    gossip->add_option("--seed", many.seed, "Of chance")->capture_default_str();
+    gossip_options many;
+    gossip->add_option("--nodes", many.nodes, "How many");
+    gossip->add_option("--minutes", many.minutes,
+                       "How long, with 5 % of packets lost and each process stopped for 2 % of the time");
+    gossip->add_option("--seed", many.seed, "Of chance");
     gossip->add_option("--only", many.only, "This part alone")
         ->check(CLI::IsMember({"start", "short-cut", "long-cut", "weather"}));
     CLI11_PARSE(program, argc, argv);
     try {
-        return *gossip    ? measure_gossip(many)
-               : *mesh    ? simulate_meshes(sparse)
-               : *sharing ? simulate_shared_work(shared, given.fault)
-                          : run(given);
+        if (*gossip) {
+            return measure_gossip(many);
+        }
+        if (*mesh) {
+            return run_seeds(mesh_seeds, [&](std::uint64_t seed) { return simulate_mesh(seed, sparse, given.fault); });
+        }
+        if (*sharing) {
+            return run_seeds(sharing_seeds,
+                             [&](std::uint64_t seed) { return simulate_sharing(seed, shared, given.fault); });
+        }
+        return run(given);
     } catch (const std::exception& e) {
         std::cerr << "cles_simulation: " << e.what() << '\n';
         return 2;

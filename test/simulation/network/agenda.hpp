@@ -25,6 +25,7 @@ class agenda final : public core::clock {
             entries_.emplace(std::max(when, now_), std::move(what)); // after those of the same time
         }
     }
+    void later(std::chrono::nanoseconds by, action what) { at(now_ + by, std::move(what)); }
     /// Advances the time to this point.
     void run_until(time_point end) {
         while (!entries_.empty() && entries_.begin()->first <= end) {

@@ -28,7 +28,7 @@ bool is_sealed(std::string_view datagram) {
 
 datagram_port::datagram_port(network& net, const std::shared_ptr<place>& home, endpoint local, bool strangers,
                              std::unique_ptr<transport::datagram_codec> codec)
-    : net_(net), home_(home), local_(local), strangers_(strangers), codec_(std::move(codec)) {
+    : net_(net), home_(home), local_(local), name_(to_string(local)), strangers_(strangers), codec_(std::move(codec)) {
     if (codec_) {
         codec_->start(*this);
     }
@@ -236,7 +236,7 @@ void datagram_link::deliver(std::string_view datagram) {
     if (const auto home = port_->codec_ ? port_->home_.lock() : nullptr) {
         home->on_link_receives(who_, datagram);
     }
-    port_->net_.watcher().saw(to_string(port_->local_), "<--", datagram);
+    port_->net_.watcher().saw(port_->name_, "<--", datagram);
     const auto owner = owner_; // which may close the link
     const auto keep = shared_from_this();
     if (datagram.size() > protocol::datagram_bytes) {
@@ -261,7 +261,7 @@ void datagram_link::flush() {
     for (std::size_t at = 0; at < text.size();) {
         const auto size = text.find('\n', at) + 1 - at;
         const auto line = std::string_view{text}.substr(at, size);
-        port_->net_.watcher().saw(to_string(port_->local_), "-->", line);
+        port_->net_.watcher().saw(port_->name_, "-->", line);
         if (const auto home = port_->codec_ ? port_->home_.lock() : nullptr) {
             home->on_link_sends(who_, line.substr(0, size - 1));
         }

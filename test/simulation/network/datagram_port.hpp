@@ -67,6 +67,7 @@ class datagram_port final : public std::enable_shared_from_this<datagram_port>,
     network& net_;
     std::weak_ptr<place> home_;
     endpoint local_;
+    std::string name_; // in the trace
     bool strangers_;
     std::function<void(link_ptr)> on_link_;
     bool dialled_ = false;

@@ -3,6 +3,8 @@
 
 #include "simulation/network/dice.hpp"
 
+#include <boost/describe/enum.hpp>
+
 #include <algorithm>
 #include <cstdint>
 #include <optional>
@@ -13,7 +15,7 @@
 namespace cles::simulation {
 
 /// Which nodes of a mesh have links to each other.
-enum class mesh_form : std::uint8_t { line, ring, star, grid, random };
+BOOST_DEFINE_FIXED_ENUM_CLASS(mesh_form, std::uint8_t, line, ring, star, grid, random);
 
 /// The name of the node on a host of a mesh.
 inline std::string mesh_name(unsigned host) { return "n" + std::to_string(host); }

@@ -34,7 +34,7 @@ group_port::group_port(network& net, node_run& process)
       process_(std::static_pointer_cast<node_run>(process.shared_from_this())), local_{process.host(),
                                                                                        first_port +
                                                                                            process.run_number() / 2},
-      source_(source_of(local_)) {}
+      name_(to_string(local_)), source_(source_of(local_)) {}
 
 void group_port::start(core::group_listener& owner) {
     owner_ = &owner;
@@ -105,9 +105,8 @@ bool group_port::put(std::string_view line) {
 }
 
 void group_port::report_sent(std::string_view line) {
-    const auto process = process_.lock();
-    if (process && process->judge() != nullptr) {
-        process->judge()->on_group_sent(*process, line);
+    if (const auto process = process_.lock()) {
+        process->judges().each(&part::on_group_sent, *process, line);
     }
 }
 
@@ -116,14 +115,10 @@ void group_port::pass_on(std::string_view line) {
     if (owner_ == nullptr || !process) {
         return;
     }
-    net_.watcher().saw(to_string(local_), "==>", net_.secured() ? "a sealed datagram" : line);
+    net_.watcher().saw(name_, "==>", net_.secured() ? "a sealed datagram" : line);
     net_.multicast(local_, line);
     if (in_system_++ == 0) {
-        process->later(until_writable, [weak = weak_from_this()] {
-            if (const auto self = weak.lock()) {
-                self->drain();
-            }
-        });
+        process->later(until_writable, if_alive(weak_from_this(), [](group_port& self) { self.drain(); }));
     }
 }
 
@@ -156,16 +151,12 @@ void group_port::receive(const endpoint& from, const std::string& datagram, bool
 void group_port::report_received(const core::group_source& from, std::string_view line) {
     const auto process = process_.lock();
     net_.watcher().saw(process->name(), "<==", line);
-    if (process->judge() != nullptr) {
-        process->judge()->on_group_heard(*process, from, line);
-    }
+    process->judges().each(&part::on_group_heard, *process, from, line);
 }
 
 void group_port::report_accepted(std::string_view member, std::string_view line) {
     const auto process = process_.lock();
-    if (process->judge() != nullptr) {
-        process->judge()->on_group_accepted(*process, member, line);
-    }
+    process->judges().each(&part::on_group_accepted, *process, member, line);
 }
 
 void group_port::hand_over(const endpoint& from, const std::string& datagram, bool to_group) {

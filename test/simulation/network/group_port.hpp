@@ -52,6 +52,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
     network& net_;
     std::weak_ptr<node_run> process_;
     endpoint local_;
+    std::string name_; // in the trace
     core::group_source source_;
     core::group_listener* owner_ = nullptr; // null: not started, or closed
     std::deque<std::string> waiting_;

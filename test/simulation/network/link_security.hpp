@@ -60,8 +60,11 @@ class link_security {
 };
 
 /// The security of a simulated node.
-class simulated_security : public core::node_security, public link_security {
+class simulated_security : public link_security {
   public:
+    virtual ~simulated_security() = default;
+    /// What the library's node uses.
+    [[nodiscard]] virtual core::node_security& of_node() = 0;
     /// What the node says with security.
     using protocol_maker = std::unique_ptr<core::security_protocol> (*)(core::node_state& host);
     [[nodiscard]] virtual protocol_maker maker_of_protocol() const = 0;

@@ -130,11 +130,9 @@ void network::dial(const std::shared_ptr<place>& from, endpoint to, const limits
         return;
     }
     const auto there = arrival(from->host(), to.host);
-    time_.at(there, [this, weak = std::weak_ptr{from}, to, bounds, done = std::move(done)] {
-        if (const auto self = weak.lock()) {
-            join(self, to, bounds, done);
-        }
-    });
+    time_.at(there, if_alive(std::weak_ptr{from}, [this, to, bounds, done = std::move(done)](place& self) {
+                 join(self.shared_from_this(), to, bounds, done);
+             }));
 }
 
 void network::join(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, const on_dialled& done) {
@@ -215,11 +213,7 @@ void network::multicast(const endpoint& from, std::string_view datagram) {
 
 void network::deliver_to_group(const std::weak_ptr<group_port>& member, const endpoint& from,
                                const std::string& datagram, std::chrono::microseconds after) {
-    time_.at(time_.now() + after, [member, from, datagram] {
-        if (const auto there = member.lock()) {
-            there->receive(from, datagram, true);
-        }
-    });
+    time_.later(after, if_alive(member, [from, datagram](group_port& there) { there.receive(from, datagram, true); }));
 }
 
 void network::inject(const endpoint& from, std::optional<endpoint> to, std::string_view datagram) {
@@ -287,7 +281,7 @@ void network::deliver(const endpoint& from, const endpoint& to, const std::strin
     if (fault_ == planted::welcome_late && datagram.starts_with(welcome)) {
         after += much_later;
     }
-    time_.at(time_.now() + after, [this, from, to, datagram] {
+    time_.later(after, [this, from, to, datagram] {
         const auto found = ports_.find(to);
         if (const auto port = found == ports_.end() ? nullptr : found->second.lock()) {
             port->receive(from, datagram);

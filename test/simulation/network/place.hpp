@@ -15,6 +15,16 @@ namespace cles::simulation {
 
 class link_security;
 
+/// Calls `what` with the object, unless that has been destroyed.
+template <class Object, class Action>
+auto if_alive(std::weak_ptr<Object> weak, Action what) {
+    return [weak = std::move(weak), what = std::move(what)](auto... arguments) {
+        if (const auto self = weak.lock()) {
+            what(*self, arguments...);
+        }
+    };
+}
+
 /// A simulated process: one incarnation of a node, or a client. After it has ended, nothing of it runs any more; while
 /// it is frozen, like a stopped process, everything that arrives waits. It has its own clock, which may be ahead.
 class place : public std::enable_shared_from_this<place> {
@@ -65,6 +75,10 @@ class place : public std::enable_shared_from_this<place> {
         if (!std::exchange(frozen_, true)) {
             frozen_at_ = now();
         }
+    }
+    void freeze_for(std::chrono::nanoseconds span) {
+        freeze();
+        time_.later(span, if_alive(weak_from_this(), [](place& self) { self.thaw(); }));
     }
     void thaw() {
         if (!frozen_) {

@@ -95,17 +95,11 @@ void stream_half::on_admitted() {
     gate_->watch([this] {
         removed_ = true;
         if (const auto home = home_.lock()) {
-            home->later({}, [weak = weak_from_this()] {
-                if (const auto self = weak.lock()) {
-                    self->lose();
-                }
-            });
+            home->later({}, if_alive(weak_from_this(), [](stream_half& self) { self.lose(); }));
         }
     });
     flush();
-    if (const auto home = home_.lock()) {
-        home->later({}, [self = shared_from_this()] { self->hand_over(); });
-    }
+    call_later({}, &stream_half::hand_over);
     if (const auto opened = std::exchange(opened_, nullptr)) {
         opened(true);
     }
@@ -113,8 +107,13 @@ void stream_half::on_admitted() {
 
 void stream_half::start(std::shared_ptr<link_events> owner) {
     owner_ = std::move(owner);
+    call_later({}, &stream_half::hand_over);
+}
+
+// In an event of its own, unless the process has ended.
+void stream_half::call_later(std::chrono::nanoseconds by, void (stream_half::*what)()) {
     if (const auto home = home_.lock()) {
-        home->later({}, [self = shared_from_this()] { self->hand_over(); });
+        home->later(by, [self = shared_from_this(), what] { ((*self).*what)(); });
     }
 }
 
@@ -256,9 +255,8 @@ void stream_half::pause(bool stop) {
     }
     if (paused_ != stop) {
         paused_ = stop;
-        const auto home = home_.lock();
-        if (!stop && !handing_ && state_ == state::open && home) {
-            home->later({}, [self = shared_from_this()] { self->hand_over(); });
+        if (!stop && !handing_ && state_ == state::open) {
+            call_later({}, &stream_half::hand_over);
         }
     }
 }
@@ -401,10 +399,7 @@ void stream_half::finish() {
 void stream_half::end_sending() {
     state_ = state::discarding;
     transmit_end();
-    if (const auto home = home_.lock()) {
-        home->later(ended_ ? std::chrono::milliseconds{0} : bounds_.discard,
-                    [self = shared_from_this()] { self->lose(); });
-    }
+    call_later(ended_ ? std::chrono::milliseconds{0} : bounds_.discard, &stream_half::lose);
 }
 
 void stream_half::cut() {
@@ -414,9 +409,9 @@ void stream_half::cut() {
         }
         half.severed_ = true;
         half.shut_ = true;
-        if (const auto home = half.home_.lock()) {
-            home->later(net_.chance_between(half.host_, half.peer_host_).within(std::chrono::milliseconds{5}),
-                        [self = half.shared_from_this()] { self->lose(); });
+        if (!half.home_.expired()) {
+            half.call_later(net_.chance_between(half.host_, half.peer_host_).within(std::chrono::milliseconds{5}),
+                            &stream_half::lose);
         }
     };
     net_.watcher().saw(name_, "is cut");

@@ -66,6 +66,7 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     void arrive_reset();
     void taken(std::size_t bytes);
 
+    void call_later(std::chrono::nanoseconds by, void (stream_half::*what)());
     bool fill();
     void admit();
     void on_admitted();

@@ -122,32 +122,32 @@ class reporting_port final : public core::group_port, private core::group_listen
 } // namespace
 
 host_security::host_security(const std::string& directory, planted fault)
-    : real_(directory), fault_(fault), terms_(std::make_shared<security::admission_terms>()) {
-    terms_->fleet = real_.members();
+    : secured_node(directory), fault_(fault), terms_(std::make_shared<security::admission_terms>()) {
+    terms_->fleet = members();
 }
 
 void host_security::begin(std::string_view name, std::uint32_t epoch, const core::clock& time,
                           core::security_observer& observer) {
     terms_->epoch = protocol::epoch_text(epoch);
-    real_.begin(name, epoch, time, observer);
+    secured_node::begin(name, epoch, time, observer);
 }
 
 bool host_security::is_member(std::string_view name) const {
-    return real_.is_member(name) || fault_ == planted::removed_served;
+    return secured_node::is_member(name) || fault_ == planted::removed_served;
 }
 
 bool host_security::allows(std::string_view requester, std::string_view provider, verb how,
                            const protocol::noun_view& noun) const {
-    return real_.allows(requester, provider, how, noun) || fault_ == planted::rights_ignored ||
-           (fault_ == planted::removed_served && !real_.is_member(requester));
+    return secured_node::allows(requester, provider, how, noun) || fault_ == planted::rights_ignored ||
+           (fault_ == planted::removed_served && !secured_node::is_member(requester));
 }
 
 std::shared_ptr<core::group_port> host_security::seal(std::shared_ptr<core::group_port> port) {
     auto below = std::dynamic_pointer_cast<simulation::group_port>(port);
     return std::make_shared<reporting_port>(
-        real_.seal(std::move(port)), std::move(below),
+        secured_node::seal(std::move(port)), std::move(below),
         [this](const core::group_datagram& bind) {
-            return real_.allows(bind.member, real_.name(), verb::bind, bind.request->noun);
+            return secured_node::allows(bind.member, name(), verb::bind, bind.request->noun);
         },
         fault_);
 }
@@ -158,7 +158,7 @@ std::unique_ptr<stream_gate> host_security::make_gate(std::string_view expected)
 }
 
 std::unique_ptr<transport::datagram_codec> host_security::make_codec() {
-    return std::make_unique<tls::udp_codec>(real_.members(), real_.datagrams());
+    return std::make_unique<tls::udp_codec>(members(), datagrams());
 }
 
 simulated_security::protocol_maker host_security::maker_of_protocol() const { return &core::make_secured_protocol; }

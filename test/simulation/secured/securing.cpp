@@ -53,7 +53,7 @@ bool permits(const std::optional<std::vector<std::string>>& rights, verb how) {
 class securing_part final : public securing {
   public:
     explicit securing_part(world& in)
-        : world_(in), chance_(in.seed() * 5 + 1), sodium_(in.seed()), fleet_(names_of(in.hosts())),
+        : securing(in), chance_(in.seed() * 5 + 1), sodium_(in.seed()), fleet_(names_of(in.hosts())),
           attacker_(in.net(), chance_.next()) {}
 
     std::shared_ptr<simulated_security> equip(unsigned host) override {
@@ -126,11 +126,12 @@ class securing_part final : public securing {
         for (unsigned other = 0; world_.has_group() && other < world_.hosts(); ++other) {
             if (other != host) {
                 auto& n = *world_.node(other);
-                listeners_.push_back(follow_by_group(n, 20'000'000 + other, world::name_of(host), "beacon", {}));
+                listeners_.push_back(follow_by_group(
+                    n, {.label = 20'000'000 + other, .target = world::name_of(host), .path = "beacon"}));
                 n.run([&] { listeners_.back()->start(); });
             }
         }
-        world_.time().at(world_.time().now() + seconds{1}, [this, host] { restart(host); });
+        world_.time().later(seconds{1}, [this, host] { restart(host); });
     }
 
     void wind_down() override {
@@ -148,36 +149,17 @@ class securing_part final : public securing {
             return;
         }
         check_source(n, what.peer, what.path);
-        const auto& roster = fleet_of(n).in_force();
-        const auto* const requester = roster.find(what.peer.name);
-        const auto text = std::string{to_string(what.verb)} + " '" + std::string{what.path} + "' of " + what.peer.name;
-        if (requester == nullptr) {
-            complain(rule::removed_unserved, n, "serves " + text + ", who is no member");
-        } else if (const auto* const self = roster.find(n.name());
-                   what.task != "cles" &&
-                   (!permits(requester->may, what.verb) || (self != nullptr && !permits(self->offers, what.verb)))) {
-            complain(rule::rights_hold, n, "serves " + text + ", who may not");
-        }
+        check_rights(n, what.peer.name, what.verb, what.task == "cles", [&] {
+            return "serves " + std::string{to_string(what.verb)} + " '" + std::string{what.path} + "' of ";
+        });
     }
 
     void on_link_sends(node_run& n, const identity& to, std::string_view line) override {
         if (to.transport == "udp") {
             ++sent_[key_of(n.name(), to.name, line)];
         }
-        if (!line.starts_with("UPDATE " + n.name() + ":")) {
-            return;
-        }
-        const auto since = look_at(n).since;
-        const auto& roster = fleet_of(n).in_force();
-        const auto* const receiver = roster.find(to.name);
-        const auto* const self = roster.find(n.name());
-        if (n.now() < since + links_end_within) {
-            return;
-        }
-        if (receiver == nullptr) {
-            complain(rule::removed_unserved, n, "sends updates to " + to.name + ", who is no member");
-        } else if (!permits(receiver->may, verb::bind) || (self != nullptr && !permits(self->offers, verb::bind))) {
-            complain(rule::rights_hold, n, "sends updates to " + to.name + ", who may not have them");
+        if (line.starts_with("UPDATE " + n.name() + ":") && n.now() >= look_at(n).since + links_end_within) {
+            check_rights(n, to.name, verb::bind, false, [] { return std::string{"sends updates to "}; });
         }
     }
 
@@ -270,6 +252,19 @@ class securing_part final : public securing {
         }
     }
 
+    /// What the node does for somebody needs a right, or at least that this is a member.
+    template <class Text>
+    void check_rights(node_run& n, const std::string& other, verb how, bool is_open, const Text& what_it_does) {
+        const auto& roster = fleet_of(n).in_force();
+        const auto* const member = roster.find(other);
+        const auto* const self = roster.find(n.name());
+        if (member == nullptr) {
+            complain(rule::removed_unserved, n, what_it_does() + other + ", who is no member");
+        } else if (!is_open && (!permits(member->may, how) || (self != nullptr && !permits(self->offers, how)))) {
+            complain(rule::rights_hold, n, what_it_does() + other + ", who may not");
+        }
+    }
+
     roster_view& look_at(node_run& n) {
         auto& v = views_[&n];
         if (const auto now = fleet_of(n).in_force().version(); v.version != now) {
@@ -292,21 +287,18 @@ class securing_part final : public securing {
         if (!looking_) {
             return;
         }
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            if (auto* n = world_.node(host)) {
-                check_version(*n);
-            }
+        for (auto* n : world_.running()) {
+            check_version(*n);
         }
-        world_.time().at(world_.time().now() + roster_look_every, [this] { look_at_all(); });
+        world_.time().later(roster_look_every, [this] { look_at_all(); });
     }
 
     void expect_newest(const char* when) {
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            auto& n = *world_.node(host);
-            if (fleet_of(n).in_force().content() != fleet_.newest().content()) {
-                complain(rule::rosters_spread, n,
+        for (auto* n : world_.running()) {
+            if (fleet_of(*n).in_force().content() != fleet_.newest().content()) {
+                complain(rule::rosters_spread, *n,
                          "does not have version " + std::to_string(fleet_.newest().version()) + " of the roster " +
-                             when + ", but " + std::to_string(fleet_of(n).in_force().version()));
+                             when + ", but " + std::to_string(fleet_of(*n).in_force().version()));
             }
         }
     }
@@ -335,7 +327,7 @@ class securing_part final : public securing {
         world_.time().at(up + back_within, [this, host] {
             for (const auto& each : listeners_) {
                 if (each->last_of(world::name_of(host)).run != world_.runs(host)) {
-                    world_.watcher().broken(rule::back_soon, each->name() + " does not receive again");
+                    complain(rule::back_soon, each->name() + " does not receive again");
                 }
             }
         });
@@ -348,20 +340,14 @@ class securing_part final : public securing {
             n->ask(to, by, {.verb = verb::pull, .noun = world::name_of(to) + ":echo/1/1", .deadline = seconds{2}},
                    when_ended([answered](std::string_view) { *answered = true; }));
         });
-        world_.time().at(world_.time().now() + back_within, [this, answered, from, to, by] {
+        world_.time().later(back_within, [this, answered, from, to, by] {
             if (!*answered) {
-                world_.watcher().broken(rule::back_soon, world::name_of(from) + " has no answer of " +
-                                                             world::name_of(to) +
-                                                             (by == carrier::stream ? " by stream" : " by datagram"));
+                complain(rule::back_soon, world::name_of(from) + " has no answer of " + world::name_of(to) +
+                                              (by == carrier::stream ? " by stream" : " by datagram"));
             }
         });
     }
 
-    void complain(rule which, const node_run& at, const std::string& what) {
-        world_.watcher().broken(which, at.name() + " " + what);
-    }
-
-    world& world_;
     dice chance_;
     seeded_sodium sodium_;
     virtual_fleet fleet_;

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/secured/virtual_fleet.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <span>
-#include <stdexcept>
 #include <utility>
 
 namespace cles::simulation {

@@ -84,7 +84,7 @@ struct order {
 
 class asking final : public part {
   public:
-    explicit asking(world& in) noexcept : world_(in) {}
+    using part::part;
 
     void on_start(node_run& n) override {
         auto& registry = n.node()->tasks;
@@ -153,11 +153,12 @@ class asking final : public part {
             }
         }
         if (!held_.empty()) {
-            world_.watcher().broken(rule::at_rest, std::to_string(held_.size()) + " handlers were never told to stop");
+            complain(rule::at_rest, std::to_string(held_.size()) + " handlers were never told to stop");
         }
     }
 
   private:
+    using part::complain;
     struct asked : order {
         unsigned run = 0; // of the node that asked
         std::uint64_t id = 0;
@@ -173,7 +174,7 @@ class asking final : public part {
     void ran(std::uint32_t op, const node_run& at) {
         const auto count = ++effects_[effect_key(op, at.host(), at.run_number())];
         if (count == 2) {
-            world_.watcher().broken(rule::effects_once, "request " + std::to_string(op) + " ran twice at " + at.name());
+            complain(rule::effects_once, "request " + std::to_string(op) + " ran twice at " + at.name());
         }
     }
 
@@ -210,8 +211,8 @@ class asking final : public part {
     // -- requests --------------------------------------------------------------------------------------------------
 
     void ask(const order& o) {
-        auto* n = world_.node(o.from);
-        if (n == nullptr || n->frozen() || asked_.contains(o.op)) {
+        auto* n = world_.active(o.from);
+        if (n == nullptr || asked_.contains(o.op)) {
             return;
         }
         const auto& task = tasks[o.what];
@@ -250,8 +251,8 @@ class asking final : public part {
             return;
         }
         auto& a = found->second;
-        auto* n = world_.node(a.from);
-        if (!a.ended && n != nullptr && n->run_number() == a.run && !n->frozen()) {
+        auto* n = world_.active(a.from);
+        if (!a.ended && n != nullptr && n->run_number() == a.run) {
             a.withdrawn = true;
             n->run([&] { n->cancel(a.id); });
             n->later(std::chrono::microseconds{1}, [this, &a] { // its result is delivered through the completion queue
@@ -281,10 +282,9 @@ class asking final : public part {
     // -- checks ----------------------------------------------------------------------------------------------------
 
     void complain(rule which, const asked& a, const std::string& what) {
-        world_.watcher().broken(which, std::string{to_string(tasks[a.what].verb)} + " '" +
-                                           std::string{tasks[a.what].name} + "' " + std::to_string(a.op) + " of " +
-                                           world::name_of(a.from) + " to " + world::name_of(a.to) +
-                                           std::string{by_names[static_cast<std::size_t>(a.by)]} + what);
+        complain(which, std::string{to_string(tasks[a.what].verb)} + " '" + std::string{tasks[a.what].name} + "' " +
+                            std::to_string(a.op) + " of " + world::name_of(a.from) + " to " + world::name_of(a.to) +
+                            std::string{by_names[static_cast<std::size_t>(a.by)]} + what);
     }
 
     [[nodiscard]] bool has_run(const asked& a) const {
@@ -376,7 +376,6 @@ class asking final : public part {
         }
     }
 
-    world& world_;
     std::map<std::uint32_t, asked> asked_;
     std::unordered_map<std::uint64_t, unsigned> effects_;     // by request, host and run
     std::map<core::call*, std::shared_ptr<core::call>> held_; // never replied to

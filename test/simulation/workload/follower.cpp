@@ -23,17 +23,10 @@ class link_follower final : public follower, private core::feed_host {
     void start() override {
         local().feeds().enter(machine_, shared_from_this(), terms_);
         // The machine owns this object, so this does not own the follower.
-        machine_.start(when_ended(
-            [weak = weak_self()](std::string_view) {
-                if (const auto self = weak.lock()) {
-                    self->begin();
-                }
-            },
-            [weak = weak_self()](errc, std::string_view why) {
-                if (const auto self = weak.lock()) {
-                    self->at().watcher().saw(self->name(), "was refused", why);
-                }
-            }));
+        machine_.start(when_ended(if_alive(weak_self(), [](link_follower& self, std::string_view) { self.begin(); }),
+                                  if_alive(weak_self(), [](link_follower& self, errc, std::string_view why) {
+                                      self.at().watcher().saw(self.name(), "was refused", why);
+                                  })));
         if (at().fault() == planted::rebind_hurried) {
             cap_pauses();
         }
@@ -47,12 +40,10 @@ class link_follower final : public follower, private core::feed_host {
     core::feed_mailbox& mail() override { return machine_.mail(); }
     // A planted fault: ends each pause after 20 ms at most.
     void cap_pauses() {
-        at().later(milliseconds{20}, [weak = weak_self()] {
-            if (const auto self = weak.lock()) {
-                self->machine_.expedite(self->at().now());
-                self->cap_pauses();
-            }
-        });
+        at().later(milliseconds{20}, if_alive(weak_self(), [](link_follower& self) {
+                       self.machine_.expedite(self.at().now());
+                       self.cap_pauses();
+                   }));
     }
 
     // Checks how the machine uses its host, and forwards all calls to the library's host.
@@ -104,21 +95,14 @@ class group_follower final : public follower {
 
 } // namespace
 
-std::shared_ptr<follower> follow_by_link(node_run& at, std::uint32_t label, std::string target, std::string path,
-                                         core::feed_terms terms, milliseconds slow) {
-    const bool thinned = terms.every_ms != 0;
-    return std::make_shared<link_follower>(
-        at,
-        follower::manner{
-            .label = label, .target = std::move(target), .path = std::move(path), .slow = slow, .thinned = thinned},
-        std::move(terms));
+std::shared_ptr<follower> follow_by_link(node_run& at, follower::manner how, core::feed_terms terms) {
+    how.thinned = terms.every_ms != 0;
+    return std::make_shared<link_follower>(at, std::move(how), std::move(terms));
 }
 
-std::shared_ptr<follower> follow_by_group(node_run& at, std::uint32_t label, std::string target, std::string path,
-                                          milliseconds slow) {
-    return std::make_shared<group_follower>(
-        at, follower::manner{
-                .label = label, .target = std::move(target), .path = std::move(path), .slow = slow, .by_group = true});
+std::shared_ptr<follower> follow_by_group(node_run& at, follower::manner how) {
+    how.by_group = true;
+    return std::make_shared<group_follower>(at, std::move(how));
 }
 
 std::string follower::name() const {
@@ -156,12 +140,10 @@ void follower::begin() {
 
 void follower::hold(milliseconds time) {
     held_ = true;
-    node_.later(time, [weak = weak_from_this()] {
-        if (const auto self = weak.lock()) {
-            self->held_ = false;
-            self->fetch();
-        }
-    });
+    node_.later(time, if_alive(weak_from_this(), [](follower& self) {
+                    self.held_ = false;
+                    self.fetch();
+                }));
 }
 
 void follower::fetch() {
@@ -177,12 +159,10 @@ void follower::fetch() {
 void follower::take(const detail::raw_event& event) {
     waits_ = false;
     if (!std::exchange(fetch_planned_, true)) {
-        node_.later(how_.slow, [weak = weak_from_this()] {
-            if (const auto self = weak.lock()) {
-                self->fetch_planned_ = false;
-                self->fetch();
-            }
-        });
+        node_.later(how_.slow, if_alive(weak_from_this(), [](follower& self) {
+                        self.fetch_planned_ = false;
+                        self.fetch();
+                    }));
     }
     if (event.kind == feed_event::gap) {
         on_gap(event);

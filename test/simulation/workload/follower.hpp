@@ -30,8 +30,8 @@ class follower : public std::enable_shared_from_this<follower> {
         std::uint32_t label;
         std::string target; ///< a node's name; in the group also "all"
         std::string path;
-        std::chrono::milliseconds slow;
-        bool by_group = false;
+        std::chrono::milliseconds slow{0};
+        bool by_group = false; // this and the next one follow from the function that makes it
         bool thinned = false;
     };
     follower(const follower&) = delete;
@@ -94,10 +94,8 @@ class follower : public std::enable_shared_from_this<follower> {
 };
 
 /// A feed over a link to the publisher, whose URL is in the terms.
-std::shared_ptr<follower> follow_by_link(node_run& at, std::uint32_t label, std::string target, std::string path,
-                                         core::feed_terms terms, std::chrono::milliseconds slow);
+std::shared_ptr<follower> follow_by_link(node_run& at, follower::manner how, core::feed_terms terms);
 /// A feed in the multicast group.
-std::shared_ptr<follower> follow_by_group(node_run& at, std::uint32_t label, std::string target, std::string path,
-                                          std::chrono::milliseconds slow);
+std::shared_ptr<follower> follow_by_group(node_run& at, follower::manner how);
 
 } // namespace cles::simulation

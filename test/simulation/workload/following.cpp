@@ -30,7 +30,7 @@ std::string path_of(unsigned noun) {
 
 class following final : public part {
   public:
-    explicit following(world& in) : world_(in), published_(in.hosts()) {}
+    explicit following(world& in) : part(in), published_(in.hosts()) {}
 
     void on_start(node_run& n) override {
         n.node()->tasks.add(verb::bind, "fix", {});
@@ -70,14 +70,9 @@ class following final : public part {
     }
 
     void on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) override {
-        if (datagram.ends_with('\n')) {
-            datagram.remove_suffix(1);
-        }
         protocol::request_line bind;
-        protocol::malformed_request ignored;
-        if (from == at.group()->source() || !protocol::parse_request(datagram, bind, ignored) ||
-            bind.verb != verb::bind || bind.noun.task == "cles" ||
-            (bind.noun.target != "all" && bind.noun.target != at.name())) {
+        if (from == at.group()->source() || !protocol::parse_group_message(datagram, bind) || bind.verb != verb::bind ||
+            bind.noun.task == "cles" || (bind.noun.target != "all" && bind.noun.target != at.name())) {
             return;
         }
         std::string scratch;
@@ -93,28 +88,25 @@ class following final : public part {
 
     void on_group_sent(node_run& by, std::string_view line) override {
         protocol::request_line update;
-        protocol::malformed_request ignored;
-        if (!protocol::parse_request(line.substr(0, line.size() - 1), update, ignored) || !update.is_update() ||
-            update.noun.task == "cles") {
+        if (!protocol::parse_group_message(line, update) || !update.is_update() || update.noun.task == "cles") {
             return;
         }
         std::string scratch;
         const std::string path{protocol::canonical_path(update.noun, scratch)};
         auto& of = nouns_[{&by, path}];
-        const auto complain = [&](const std::string& what) {
-            world_.watcher().broken(rule::sent_once,
-                                    by.name() + " sends " + std::to_string(*update.seq) + " of " + path + " " + what);
+        const auto complain_that = [&](const std::string& what) {
+            complain(rule::sent_once, by, "sends " + std::to_string(*update.seq) + " of " + path + " " + what);
         };
         const auto now = by.now();
         // A node that was stopped processes everything that was due meanwhile.
         if (!by.was_frozen_until_now() &&
             std::none_of(of.leases.begin(), of.leases.end(), [now](const auto& l) { return l.second >= now; })) {
-            complain("though nobody is bound");
+            complain_that("though nobody is bound");
         }
         if (*update.seq < of.sent) {
-            complain("after " + std::to_string(of.sent));
+            complain_that("after " + std::to_string(of.sent));
         } else if (*update.seq == of.sent && !std::exchange(of.newly_bound, false)) {
-            complain("again, and nobody is newly bound");
+            complain_that("again, and nobody is newly bound");
         }
         of.sent = *update.seq;
     }
@@ -123,11 +115,10 @@ class following final : public part {
         for (const auto& [key, f] : followers_) {
             seen_before_probe_[f->how().label] = f->seen();
         }
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            publish(host, 0, 2, 10);
-            publish(host, 1, 2, 10);
-            offer(host, 2, 10);
-            auto* n = world_.node(host);
+        for (auto* n : world_.running()) {
+            publish(n->host(), 0, 2, 10);
+            publish(n->host(), 1, 2, 10);
+            offer(n->host(), 2, 10);
             n->run([n] {
                 for (const auto* noun : {"notice", "survey"}) {
                     n->local().publish(noun, [](json_writer& w) { w.raw("{}"); });
@@ -146,7 +137,7 @@ class following final : public part {
             }
             const auto before = seen_before_probe_.find(f->how().label);
             if (before != seen_before_probe_.end() && f->seen() == before->second) {
-                world_.watcher().broken(rule::feeds_receive, f->name() + " receives nothing though all is well");
+                complain(rule::feeds_receive, f->name() + " receives nothing though all is well");
                 continue;
             }
             for (unsigned host = 0; host < world_.hosts(); ++host) {
@@ -163,10 +154,10 @@ class following final : public part {
         }
         followers_.clear();
         // The failure of a peer without notice is detected when something is written to it.
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            world_.node(host)->later(std::chrono::seconds{1}, [this, host] {
+        for (auto* n : world_.running()) {
+            n->later(std::chrono::seconds{1}, [this, n] {
                 for (unsigned noun = 0; noun < own_nouns; ++noun) {
-                    publish(host, noun, 1, 0);
+                    publish(n->host(), noun, 1, 0);
                 }
             });
         }
@@ -174,7 +165,7 @@ class following final : public part {
 
     void judge_rest() override {
         if (const auto open = offers_.use_count() - 1; open != 0) {
-            world_.watcher().broken(rule::at_rest, std::to_string(open) + " publications wait for room");
+            complain(rule::at_rest, std::to_string(open) + " publications wait for room");
         }
     }
 
@@ -199,25 +190,27 @@ class following final : public part {
     }
 
     void follow(const action& a) {
-        auto* n = world_.node(a["from"]);
-        if (n == nullptr || n->frozen() || find(a["feed"])) {
+        auto* n = world_.active(a["from"]);
+        if (n == nullptr || find(a["feed"])) {
             return;
         }
         const auto target = world::name_of(a["to"]);
         const auto path = path_of(a["noun"]);
-        add(*n, follow_by_link(*n, a["feed"], target, path,
-                               {.noun = target + ":" + path,
-                                .at = n->address_for(a["to"], a["by"] == 0 ? carrier::stream : carrier::datagram),
-                                .every_ms = a["every"],
-                                .keep = a["keep"]},
-                               milliseconds{a["slow"]}));
+        add(*n,
+            follow_by_link(*n, {.label = a["feed"], .target = target, .path = path, .slow = milliseconds{a["slow"]}},
+                           {.noun = target + ":" + path,
+                            .at = n->address_for(a["to"], a["by"] == 0 ? carrier::stream : carrier::datagram),
+                            .every_ms = a["every"],
+                            .keep = a["keep"]}));
     }
 
     void gather(const action& a) {
-        auto* n = world_.node(a["from"]);
-        if (world_.has_group() && n != nullptr && !n->frozen() && !find(a["feed"])) {
-            add(*n, follow_by_group(*n, a["feed"], a["all"] != 0 ? "all" : world::name_of(a["to"]), path_of(a["noun"]),
-                                    milliseconds{a["slow"]}));
+        auto* n = world_.active(a["from"]);
+        if (world_.has_group() && n != nullptr && !find(a["feed"])) {
+            add(*n, follow_by_group(*n, {.label = a["feed"],
+                                         .target = a["all"] != 0 ? "all" : world::name_of(a["to"]),
+                                         .path = path_of(a["noun"]),
+                                         .slow = milliseconds{a["slow"]}}));
         }
     }
 
@@ -233,8 +226,8 @@ class following final : public part {
     }
 
     void publish(unsigned host, unsigned noun, unsigned count, std::size_t size) {
-        auto* n = world_.node(host);
-        if (n == nullptr || n->frozen()) {
+        auto* n = world_.active(host);
+        if (n == nullptr) {
             return;
         }
         n->run([&] {
@@ -246,8 +239,8 @@ class following final : public part {
     }
 
     void offer(unsigned host, unsigned count, std::size_t size) {
-        auto* n = world_.node(host);
-        if (n == nullptr || n->frozen()) {
+        auto* n = world_.active(host);
+        if (n == nullptr) {
             return;
         }
         n->run([&] {
@@ -263,18 +256,17 @@ class following final : public part {
 
     void probe_group() {
         std::vector<follower_ptr> newcomers;
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            auto& n = *world_.node(host);
-            const auto target = host % 2 == 0 ? world::name_of((host + 1) % world_.hosts()) : "all";
-            newcomers.push_back(add(n, follow_by_group(n, ++next_probe_, target, beacon, milliseconds{0})));
+        for (auto* n : world_.running()) {
+            const auto target = n->host() % 2 == 0 ? world::name_of((n->host() + 1) % world_.hosts()) : "all";
+            newcomers.push_back(
+                add(*n, follow_by_group(*n, {.label = ++next_probe_, .target = target, .path = beacon})));
         }
-        world_.time().at(world_.time().now() + repeated_within, [this, newcomers] {
+        world_.time().later(repeated_within, [this, newcomers] {
             for (const auto& f : newcomers) {
                 for (unsigned host = 0; host < world_.hosts(); ++host) {
                     const auto name = world::name_of(host);
                     if (f->wants(name) && f->last_of(name).run != world_.runs(host)) {
-                        world_.watcher().broken(rule::first_soon,
-                                                f->name() + " has not got the last update of " + name);
+                        complain(rule::first_soon, f->name() + " has not got the last update of " + name);
                     }
                 }
             }
@@ -286,14 +278,13 @@ class following final : public part {
         for (unsigned noun = 0; noun < own_nouns; ++noun) {
             const auto published = published_[host][noun];
             if (f.how().path == path_of(noun) && (last.run != world_.runs(host) || last.number != published)) {
-                world_.watcher().broken(rule::feeds_receive, f.name() + " has got " + std::to_string(last.number) +
-                                                                 " of " + std::to_string(published) + " that " +
-                                                                 world::name_of(host) + " has published");
+                complain(rule::feeds_receive, f.name() + " has got " + std::to_string(last.number) + " of " +
+                                                  std::to_string(published) + " that " + world::name_of(host) +
+                                                  " has published");
             }
         }
     }
 
-    world& world_;
     std::map<std::pair<bool, std::uint32_t>, follower_ptr> followers_; // by whether it is by the group, and label
     std::map<std::uint32_t, std::uint64_t> seen_before_probe_;
     std::vector<std::array<std::uint64_t, own_nouns>> published_; // by the present run of each host

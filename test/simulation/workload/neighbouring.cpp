@@ -30,7 +30,7 @@ std::string run_text(std::string_view node, std::uint32_t epoch) {
 
 class neighbouring final : public part {
   public:
-    explicit neighbouring(world& in) noexcept : world_(in) {}
+    using part::part;
     ~neighbouring() override {
         for (const auto& [host, n] : namesakes_) {
             n->crash();
@@ -40,8 +40,9 @@ class neighbouring final : public part {
     void perform(const action& a) override {
         if (a.what == deed::namesake && world_.has_group() && !world_.secured()) {
             begin_namesake(a["host"]);
-            world_.time().at(world_.time().now() + milliseconds{a["for"]},
-                             [this, host = a["host"], silently = a["silent"] != 0] { end_namesake(host, silently); });
+            world_.time().later(milliseconds{a["for"]}, [this, host = a["host"], silently = a["silent"] != 0] {
+                end_namesake(host, silently);
+            });
         }
     }
 
@@ -56,13 +57,9 @@ class neighbouring final : public part {
 
     void on_group_heard(node_run& at, const core::group_source&, std::string_view datagram) override {
         protocol::request_line update;
-        protocol::malformed_request ignored;
         core::announcement said;
         std::string why;
-        if (datagram.ends_with('\n')) {
-            datagram.remove_suffix(1);
-        }
-        if (!protocol::parse_request(datagram, update, ignored) || !update.is_update() || update.noun.task != "cles") {
+        if (!protocol::parse_group_message(datagram, update) || !update.is_update() || update.noun.task != "cles") {
             return;
         }
         if (update.noun.path == core::load_path) {
@@ -139,7 +136,7 @@ class neighbouring final : public part {
         }
         // With security, all need the newest roster first.
         const auto soon = world_.secured() ? 2 * until_all_know : until_all_know;
-        world_.time().at(world_.time().now() + soon, [this] { expect_all_known("soon"); });
+        world_.time().later(soon, [this] { expect_all_known("soon"); });
     }
 
     void probe() override {
@@ -154,15 +151,14 @@ class neighbouring final : public part {
             return;
         }
         begin_namesake(0);
-        world_.time().at(world_.time().now() + namesake_lives, [this] {
-            for (unsigned host = 0; host < world_.hosts(); ++host) {
-                auto& n = *world_.node(host);
-                if (!accounts_[&n].clashes.contains(world::name_of(0))) {
-                    complain(rule::clashes_told, n, "does not say that there is a second " + world::name_of(0));
+        world_.time().later(namesake_lives, [this] {
+            for (auto* n : world_.running()) {
+                if (!accounts_[n].clashes.contains(world::name_of(0))) {
+                    complain(rule::clashes_told, *n, "does not say that there is a second " + world::name_of(0));
                 }
-                const auto known = n.node()->peers.find_member(world::name_of(0));
-                if (host != 0 && (!known || protocol::epoch_text(known->epoch) != world_.node(0)->node()->epoch)) {
-                    complain(rule::clashes_told, n, "asks a namesake for " + world::name_of(0));
+                const auto known = n->node()->peers.find_member(world::name_of(0));
+                if (n->host() != 0 && (!known || protocol::epoch_text(known->epoch) != world_.node(0)->node()->epoch)) {
+                    complain(rule::clashes_told, *n, "asks a namesake for " + world::name_of(0));
                 }
             }
             end_namesake(0, false);
@@ -174,11 +170,10 @@ class neighbouring final : public part {
             return;
         }
         expect_all_known("still");
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            const auto& n = *world_.node(host)->node();
-            for (const auto& p : n.peers.list(n.time.now())) {
+        for (auto* n : world_.running()) {
+            for (const auto& p : n->node()->peers.list(n->now())) {
                 if (p.state == peer_state::clash) {
-                    complain(rule::clashes_told, *world_.node(host), "still lists a second " + p.node);
+                    complain(rule::clashes_told, *n, "still lists a second " + p.node);
                 }
             }
         }
@@ -186,13 +181,12 @@ class neighbouring final : public part {
 
     void wind_down() override {
         looking_ = false;
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            auto* n = world_.node(host);
+        for (auto* n : world_.running()) {
             if (n->group() == nullptr) {
                 continue;
             }
             n->run([&] {
-                if (host % 2 == 0) {
+                if (n->host() % 2 == 0) {
                     n->local().discovery().leave();
                 } else {
                     n->fall_silent();
@@ -263,17 +257,13 @@ class neighbouring final : public part {
         const auto listens = [&](node_run& n) {
             return !n.frozen() && n.thawed_at() + enough < n.now() && !n.was_frozen_until_now();
         };
-        const auto is_it = [&](node_run* n) {
-            return n != nullptr && n->name() == node && n->node()->epoch == protocol::epoch_text(epoch);
-        };
-        node_run* asked = nullptr;
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            asked = is_it(world_.node(host)) ? world_.node(host) : asked;
-        }
+        auto all = world_.running();
         for (const auto& [host, n] : namesakes_) {
-            asked = is_it(n.get()) ? n.get() : asked;
+            all.push_back(n.get());
         }
-        return asked != nullptr && listens(at) && listens(*asked) &&
+        const auto asked = std::ranges::find_if(
+            all, [&](node_run* n) { return n->name() == node && n->node()->epoch == protocol::epoch_text(epoch); });
+        return asked != all.end() && listens(at) && listens(**asked) &&
                world_.net().undisturbed_since(world_.time().now() - enough);
     }
 
@@ -288,64 +278,60 @@ class neighbouring final : public part {
         if (!looking_) {
             return;
         }
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            if (auto* n = world_.node(host); n != nullptr && !n->frozen() && !n->was_frozen_until_now()) {
+        for (auto* n : world_.running()) {
+            if (!n->frozen() && !n->was_frozen_until_now()) {
                 n->node()->peers.for_each([&](const membership::member& other) { look_at(*n, other); });
             }
         }
-        world_.time().at(world_.time().now() + look_every, [this] { look_at_all(); });
+        world_.time().later(look_every, [this] { look_at_all(); });
     }
 
     void look_at(node_run& n, const membership::member& other) {
         const auto& runs = accounts_[&n].runs;
         const auto found = runs.find(other.epoch);
-        const auto who = run_text(other.node, other.epoch);
+        const auto complain_that = [&](const std::string& does, const char* what) {
+            complain(rule::gone_in_time, n, does + " " + run_text(other.node, other.epoch) + what);
+        };
         if (found == runs.end() || found->second.node != other.node) {
-            complain(rule::gone_in_time, n, "lists " + who + ", whom it has not heard");
+            complain_that("lists", ", whom it has not heard");
             return;
         }
         const auto& r = found->second;
         const auto since = std::max({r.at, r.reported, n.thawed_at()});
         if (r.left) {
-            complain(rule::gone_in_time, n, "lists " + who + ", who has left");
+            complain_that("lists", ", who has left");
         } else if (n.now() > since + until_gone(r.interval) + slack) {
-            complain(rule::gone_in_time, n, "lists " + who + ", who is silent");
+            complain_that("lists", ", who is silent");
         } else if (!other.suspect && n.now() > since + until_silent(r.interval) + slack) {
-            complain(rule::gone_in_time, n, "does not suspect " + who + ", who is silent");
+            complain_that("does not suspect", ", who is silent");
         }
     }
 
     void expect_all_known(const char* when) {
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            auto& n = *world_.node(host);
-            const auto& others = n.node()->peers;
-            for (unsigned other = 0; other < world_.hosts(); ++other) {
-                const auto name = world::name_of(other);
+        const auto all = world_.running();
+        for (auto* n : all) {
+            const auto& others = n->node()->peers;
+            for (auto* other : all) {
+                const auto& name = other->name();
                 const auto known = others.find_member(name);
-                if (other == host) {
+                if (other == n) {
                     continue;
                 }
-                if (!known || known->suspect ||
-                    protocol::epoch_text(known->epoch) != world_.node(other)->node()->epoch) {
-                    complain(rule::others_known, n,
+                if (!known || known->suspect || protocol::epoch_text(known->epoch) != other->node()->epoch) {
+                    complain(rule::others_known, *n,
                              "does not " + std::string{when} + " know " + name + " as it is" +
                                  (known ? ", but as " + run_text(name, known->epoch) : std::string{}));
-                } else if (known->where != world_.net().url_of(other, carrier::stream) ||
+                } else if (known->where != world_.net().url_of(other->host(), carrier::stream) ||
                            others.address_of(name) != known->where) {
-                    complain(rule::others_known, n, "takes " + name + " to be at " + std::string{known->where});
+                    complain(rule::others_known, *n, "takes " + name + " to be at " + std::string{known->where});
                 }
             }
             if (others.size() >= world_.hosts()) {
-                complain(rule::others_known, n, "knows " + std::to_string(others.size()) + " others");
+                complain(rule::others_known, *n, "knows " + std::to_string(others.size()) + " others");
             }
         }
     }
 
-    void complain(rule which, node_run& at, const std::string& what) {
-        world_.watcher().broken(which, at.name() + " " + what);
-    }
-
-    world& world_;
     std::map<const node_run*, account> accounts_;
     std::map<unsigned, std::shared_ptr<node_run>> namesakes_; // by host
     std::map<std::uint32_t, time_point> began_;               // of each run, by epoch

@@ -5,10 +5,16 @@
 
 #include "node/membership/membership.hpp"
 #include "port/group_port.hpp"
+#include "simulation/network/place.hpp"
 #include "simulation/world/plan.hpp"
+#include "simulation/world/witness.hpp"
 
 #include <memory>
+#include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
 
 namespace cles::simulation {
 
@@ -20,7 +26,7 @@ class world;
 /// (plan.hpp), its generation (make_plan.cpp), and a part that performs and checks it (world.cpp lists them).
 class part {
   public:
-    part() = default;
+    explicit part(world& in) noexcept : world_(in) {}
     part(const part&) = delete;
     part& operator=(const part&) = delete;
     virtual ~part() = default;
@@ -58,6 +64,27 @@ class part {
     virtual void wind_down() {}
     /// There has been no activity for long.
     virtual void judge_rest() {}
+
+  protected:
+    void complain(rule which, const std::string& what);
+    void complain(rule which, const place& at, const std::string& what) { complain(which, at.name() + " " + what); }
+
+    world& world_;
+};
+
+/// The parts of a run. What is reported to them goes to each, in this order.
+class part_list {
+  public:
+    void add(std::unique_ptr<part> next) { all_.push_back(std::move(next)); }
+    template <class... Arguments>
+    void each(void (part::*what)(Arguments...), std::type_identity_t<Arguments>... arguments) const {
+        for (const auto& p : all_) {
+            ((*p).*what)(arguments...);
+        }
+    }
+
+  private:
+    std::vector<std::unique_ptr<part>> all_;
 };
 
 /// Requests and their handlers: every node sends every other node requests with all verbs but BIND, cancels some, and
@@ -77,6 +104,7 @@ std::unique_ptr<part> make_talking(world& in);
 /// and opens links. Checks what may never happen then.
 class securing : public part {
   public:
+    using part::part;
     /// What a new node of that host uses; null if it cannot start, because its roster does not contain it.
     virtual std::shared_ptr<simulated_security> equip(unsigned host) = 0;
 };

@@ -59,8 +59,8 @@ class talker final : public place, public link_events {
         if (link_ == nullptr) {
             return;
         }
-        if (!over_ && !expected_.empty() && !excused_) {
-            complain(rule::ends_in_time, std::to_string(expected_.size()) + " requests have not been answered");
+        if (!over_) {
+            expect_answered(rule::ends_in_time, "so far");
         }
         if (!over_ && how_.end == ending::half_closes && !excused_) {
             complain(rule::ends_in_time, "the node has not ended the link");
@@ -98,9 +98,8 @@ class talker final : public place, public link_events {
     void on_batch() override {}
     void on_end() override {
         // A node replies to all requests without ids before it ends the link.
-        if (!expected_.empty() && !excused_ && !link_->was_cut()) {
-            complain(rule::reply_order,
-                     std::to_string(expected_.size()) + " requests were not answered before the end");
+        if (!link_->was_cut()) {
+            expect_answered(rule::reply_order, "before the end");
         }
         over_ = true;
         link_->close();
@@ -108,10 +107,7 @@ class talker final : public place, public link_events {
     void on_lost(boost::system::error_code) override {
         over_ = true;
         excused_ = excused_ || link_->was_cut();
-        if (!expected_.empty() && !excused_) {
-            complain(rule::reply_order,
-                     std::to_string(expected_.size()) + " requests were not answered before the loss");
-        }
+        expect_answered(rule::reply_order, "before the loss");
     }
     void on_writable() override {}
 
@@ -212,12 +208,10 @@ class talker final : public place, public link_events {
         protocol::failure why;
         protocol::parse_failure(line, why);
         const bool any_time = why.code == errc::busy || why.code == errc::deadline || why.code == errc::too_large;
-        const bool fits = e.what == kind::malformed ? why.code == errc::bad_request
-                          : e.what == kind::unknown
-                              ? why.code == errc::no_task && why.message.find(std::to_string(e.op)) != std::string::npos
-                          : e.what == kind::failure
-                              ? why.code == errc::failed && why.message.find(std::to_string(e.op)) != std::string::npos
-                              : false;
+        const bool names_it = why.message.find(std::to_string(e.op)) != std::string::npos;
+        const bool fits = (e.what == kind::malformed && why.code == errc::bad_request) ||
+                          (e.what == kind::unknown && why.code == errc::no_task && names_it) ||
+                          (e.what == kind::failure && why.code == errc::failed && names_it);
         if (!fits && !(any_time && e.what != kind::malformed)) {
             unlike();
         }
@@ -240,6 +234,12 @@ class talker final : public place, public link_events {
         }
     }
 
+    void expect_answered(rule which, const char* when) {
+        if (!expected_.empty() && !excused_) {
+            complain(which, std::to_string(expected_.size()) + " requests were not answered " + when);
+        }
+    }
+
     void complain(rule which, const std::string& what) { net_.watcher().broken(which, name() + ": " + what); }
 
     network& net_;
@@ -257,7 +257,7 @@ class talker final : public place, public link_events {
 
 class talking final : public part {
   public:
-    explicit talking(world& in) noexcept : world_(in) {}
+    using part::part;
 
     void perform(const action& a) override {
         constexpr std::uint32_t first = 1'000'000; // greater than those of the nodes' requests
@@ -298,7 +298,6 @@ class talking final : public part {
         }
     }
 
-    world& world_;
     std::vector<std::shared_ptr<talker>> talkers_;
 };
 

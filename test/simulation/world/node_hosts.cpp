@@ -8,6 +8,21 @@ node_run* node_hosts::node(unsigned host) const noexcept {
     return found == nodes_.end() ? nullptr : found->second.get();
 }
 
+node_run* node_hosts::active(unsigned host) const noexcept {
+    auto* n = node(host);
+    return n == nullptr || n->frozen() ? nullptr : n;
+}
+
+std::vector<node_run*> node_hosts::running() const {
+    std::vector<node_run*> all;
+    for (const auto& [host, n] : nodes_) {
+        if (n) {
+            all.push_back(n.get());
+        }
+    }
+    return all;
+}
+
 void node_hosts::end_all() {
     time_.clear();
     for (auto& [host, n] : nodes_) {
@@ -25,7 +40,7 @@ void node_hosts::end_node(unsigned host, std::chrono::milliseconds down) {
     const auto gone = nodes_[host];
     end_run(*gone);
     nodes_[host].reset();
-    time_.at(time_.now() + down, [this, host] {
+    time_.later(down, [this, host] {
         if (node(host) == nullptr) {
             start(host);
         }
@@ -35,12 +50,7 @@ void node_hosts::end_node(unsigned host, std::chrono::milliseconds down) {
 void node_hosts::freeze(unsigned host, std::chrono::milliseconds span) {
     if (auto* n = node(host)) {
         watcher_.saw(n->name(), "is stopped");
-        n->freeze();
-        time_.at(time_.now() + span, [weak = n->weak_from_this()] {
-            if (const auto alive = weak.lock()) {
-                alive->thaw();
-            }
-        });
+        n->freeze_for(span);
     }
 }
 

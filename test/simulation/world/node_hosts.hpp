@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <vector>
 
 namespace cles::simulation {
 
@@ -27,6 +28,10 @@ class node_hosts {
     [[nodiscard]] planted fault() const noexcept { return net_.fault(); }
     /// The node that runs there; null if there is none.
     [[nodiscard]] node_run* node(unsigned host) const noexcept;
+    /// The same; null also if it is suspended.
+    [[nodiscard]] node_run* active(unsigned host) const noexcept;
+    /// All nodes that run, in the order of their hosts.
+    [[nodiscard]] std::vector<node_run*> running() const;
 
   protected:
     node_hosts(std::uint64_t seed, planted fault) : chance_(seed), net_(time_, watcher_, chance_.next(), fault) {}
@@ -37,6 +42,15 @@ class node_hosts {
     virtual void end_run(node_run& n) { n.crash(); }
     /// No further events run. Call this before what `end_run` needs is destroyed.
     void end_all();
+
+    /// Checks that a node stays within its limits.
+    virtual void check(node_run& n) { n.check_bounds(); }
+    /// Checks another node of the first hosts each time.
+    void check_next(unsigned hosts) {
+        if (auto* n = node(static_cast<unsigned>(time_.steps() / 64 % hosts))) {
+            check(*n);
+        }
+    }
 
     /// Crashes the node there; after this time another one starts.
     void end_node(unsigned host, std::chrono::milliseconds down);

@@ -13,6 +13,8 @@
 namespace cles::simulation {
 namespace {
 
+const part_list nobody;
+
 std::string_view name_of(core::membership::change what) noexcept {
     constexpr std::array<std::string_view, 9> names{"finds",        "finds elsewhere", "hears nothing of",
                                                     "hears again",  "sees leaving",    "gives up",
@@ -53,22 +55,28 @@ detail::pending_ptr when_ended(std::function<void(std::string_view json)> succee
 }
 
 node_run::node_run(network& net, unsigned host, unsigned run, std::string name, options how)
-    : place(net.time(), host, std::move(name)), net_(net), run_(run), judge_(how.judge),
-      security_(std::move(how.security)),
+    : place(net.time(), host, std::move(name)), net_(net), run_(run),
+      judges_(how.judges != nullptr ? *how.judges : nobody), security_(std::move(how.security)),
       environment_(std::make_shared<virtual_environment>(net, *this, how.seed, how.strangers)),
       local_(std::make_shared<core::local_node>(
           environment_,
-          core::local_node_options{.node = {.name = this->name(),
-                                            .bounds = how.bounds,
-                                            .authorise = security_ ? reporter() : authoriser{},
-                                            .security = security_,
-                                            .secured = security_ ? security_->maker_of_protocol() : nullptr,
-                                            .load = std::move(how.load)},
-                                   .peers = std::move(how.peers),
-                                   .insecure = true,
-                                   .multicast = {.interface = how.multicast ? "net0" : ""},
-                                   .gossip = std::move(how.gossip),
-                                   .routing = how.routing})),
+          core::local_node_options{
+              .node = {.name = this->name(),
+                       .bounds = how.bounds,
+                       .authorise = security_ ? authoriser{[this](const access& what) {
+                           judges_.each(&part::on_request, *this, what);
+                           return true;
+                       }}
+                                              : authoriser{},
+                       .security =
+                           security_ ? std::shared_ptr<core::node_security>{security_, &security_->of_node()} : nullptr,
+                       .secured = security_ ? security_->maker_of_protocol() : nullptr,
+                       .load = std::move(how.load)},
+              .peers = std::move(how.peers),
+              .insecure = true,
+              .multicast = {.interface = how.multicast ? "net0" : ""},
+              .gossip = std::move(how.gossip),
+              .routing = how.routing})),
       told_(local_->discovery().membership_watcher()) {
     local_->node().peers.watch(this);
 }
@@ -123,31 +131,18 @@ std::uint64_t node_run::ask(unsigned to, carrier by, const request_order& what, 
                         std::move(operation));
 }
 
-authoriser node_run::reporter() {
-    return [this](const access& what) {
-        if (judge_ != nullptr) {
-            judge_->on_request(*this, what);
-        }
-        return true;
-    };
-}
-
 void node_run::on_link_sends(const identity& to, std::string_view line) {
-    if (judge_ != nullptr) {
-        judge_->on_link_sends(*this, to, line);
-    }
+    judges_.each(&part::on_link_sends, *this, to, line);
 }
 
 void node_run::on_link_receives(const identity& from, std::string_view line) {
-    if (judge_ != nullptr) {
-        judge_->on_link_receives(*this, from, line);
-    }
+    judges_.each(&part::on_link_receives, *this, from, line);
 }
 
 void node_run::on_peer(std::string_view node, core::membership::change what, std::string_view where) {
     watcher().saw(name(), name_of(what), node);
-    if (judge_ != nullptr && (what != core::membership::change::clash || fault() != planted::clash_kept)) {
-        judge_->on_neighbour(*this, node, what);
+    if (what != core::membership::change::clash || fault() != planted::clash_kept) {
+        judges_.each(&part::on_neighbour, *this, node, what);
     }
     told_.on_peer(node, what, where);
 }
@@ -155,39 +150,30 @@ void node_run::on_peer(std::string_view node, core::membership::change what, std
 // -- checks ----------------------------------------------------------------------------------------------------------
 
 void node_run::check_bounds() {
+    const auto expect_at_most = [&](std::size_t most, std::size_t count, const char* what) {
+        if (count > most) {
+            complain(rule::bounded, "holds " + std::to_string(count) + " " + what);
+        }
+    };
     const auto& b = bounds();
     auto& n = *node();
     constexpr std::size_t largest_datagram = 1500;
-    if (n.remembered.used > b.remembered + b.running * largest_datagram) {
-        complain(rule::bounded, "remembers " + std::to_string(n.remembered.used) + " bytes of datagrams");
-    }
-    if (n.counts.handlers_running > b.running) {
-        complain(rule::bounded, "runs " + std::to_string(n.counts.handlers_running) + " handlers");
-    }
-    if (n.peers.size() > b.peers || n.counts.group_leases > b.group_leases) {
-        complain(rule::bounded, "knows " + std::to_string(n.peers.size()) + " nodes and holds " +
-                                    std::to_string(n.counts.group_leases) + " leases of the group");
-    }
-    if (group() != nullptr && group()->unsent() > group_port::max_waiting) {
-        complain(rule::bounded, "holds " + std::to_string(group()->unsent()) + " bytes for the group");
-    }
+    expect_at_most(b.remembered + b.running * largest_datagram, n.remembered.used, "bytes of remembered datagrams");
+    expect_at_most(b.running, n.counts.handlers_running, "handlers that run");
+    expect_at_most(b.peers, n.peers.size(), "known nodes");
+    expect_at_most(b.group_leases, n.counts.group_leases, "leases of the group");
+    expect_at_most(group_port::max_waiting, group() != nullptr ? group()->unsent() : 0, "bytes for the group");
     // The limit on unread output, the replies of one turn beyond it, running handlers, and updates, which are sent in
     // pieces. The node's own requests are not limited.
     constexpr std::size_t piece = 65536;
     constexpr std::size_t lines_per_write = 32;
     const auto longest = std::min<std::size_t>(b.line, 4096);
-    const auto most_unsent = b.unread + (lines_per_write + b.in_flight) * longest + 2 * piece;
-    if (const auto held = environment_->most_held(); held > most_unsent) {
-        complain(rule::bounded, "holds " + std::to_string(held) + " bytes for a link");
-    }
+    expect_at_most(b.unread + (lines_per_write + b.in_flight) * longest + 2 * piece, environment_->most_held(),
+                   "bytes for a link");
     for (const auto& c : local_->connections().all()) {
         const auto& serving = c->session().serving();
-        if (serving.bindings() > b.bindings) {
-            complain(rule::bounded, "holds " + std::to_string(serving.bindings()) + " bindings");
-        }
-        if (serving.in_flight() > b.in_flight + b.waiting / 2) {
-            complain(rule::bounded, "has " + std::to_string(serving.in_flight()) + " in flight");
-        }
+        expect_at_most(b.bindings, serving.bindings(), "bindings");
+        expect_at_most(b.in_flight + b.waiting / 2, serving.in_flight(), "requests in flight");
     }
 }
 

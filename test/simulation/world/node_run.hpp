@@ -23,7 +23,7 @@
 
 namespace cles::simulation {
 
-class part;
+class part_list;
 
 /// An operation whose result is passed to one of two functions, unless it is discarded.
 detail::pending_ptr when_ended(std::function<void(std::string_view json)> succeeded,
@@ -44,9 +44,9 @@ class node_run final : public place, private core::membership::watcher {
     struct options {
         std::uint64_t seed = 0; ///< of its own random numbers
         limits bounds{};
-        bool strangers = false; ///< output to sources of datagrams is limited
-        bool multicast = false; ///< it takes part in the group
-        part* judge = nullptr;  ///< checks its membership reports; null: none
+        bool strangers = false;            ///< output to sources of datagrams is limited
+        bool multicast = false;            ///< it takes part in the group
+        const part_list* judges = nullptr; ///< learn what it sends, receives and reports; null: none
         std::function<node_load()> load{};
         const detail::routing_part* routing = nullptr;
         std::shared_ptr<simulated_security> security{}; ///< null: none
@@ -68,6 +68,7 @@ class node_run final : public place, private core::membership::watcher {
     [[nodiscard]] simulated_security* security() noexcept override { return security_.get(); }
     void on_link_sends(const identity& to, std::string_view line) override;
     void on_link_receives(const identity& from, std::string_view line) override;
+    [[nodiscard]] const part_list& judges() const noexcept { return judges_; }
 
     [[nodiscard]] core::node_state* node() noexcept { return &local_->node(); }
     [[nodiscard]] core::local_node& local() noexcept { return *local_; }
@@ -75,7 +76,6 @@ class node_run final : public place, private core::membership::watcher {
     [[nodiscard]] const limits& bounds() const noexcept { return local_->bounds(); }
     [[nodiscard]] witness& watcher() noexcept { return net_.watcher(); }
     [[nodiscard]] planted fault() const noexcept { return net_.fault(); }
-    [[nodiscard]] part* judge() const noexcept { return judge_; }
     /// The number of this incarnation on its host, from 1.
     [[nodiscard]] unsigned run_number() const noexcept { return run_; }
     /// By the node's own clock.
@@ -99,13 +99,12 @@ class node_run final : public place, private core::membership::watcher {
 
   private:
     void after_jump() override { environment_->on_jump(); }
-    [[nodiscard]] authoriser reporter();
     void on_peer(std::string_view node, core::membership::change what, std::string_view where) override;
     void complain(rule which, const std::string& what) { watcher().broken(which, name() + ": " + what); }
 
     network& net_;
     unsigned run_;
-    part* judge_;
+    const part_list& judges_;
     std::shared_ptr<simulated_security> security_;
     std::shared_ptr<virtual_environment> environment_;
     std::shared_ptr<core::local_node> local_;

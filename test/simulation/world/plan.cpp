@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/world/plan.hpp"
 
+#include <boost/describe/enum_from_string.hpp>
+
 #include <algorithm>
 #include <charconv>
 #include <fstream>
@@ -12,38 +14,30 @@ namespace {
 
 using names = std::array<std::string_view, action::most_fields>;
 
-struct kind {
-    std::string_view name;
-    std::size_t count;
-    names fields;
-};
-
 // In the order of `deed`. Times and durations in milliseconds, sizes in bytes, probabilities per mille.
-constexpr std::array<kind, 21> kinds{{
-    {"ask", 10, {"op", "from", "to", "by", "what", "deadline", "size", "work", "steps", "end"}},
-    {"cancel", 1, {"op"}},
-    {"follow", 8, {"feed", "from", "to", "by", "noun", "every", "keep", "slow"}},
-    {"hold", 2, {"feed", "for"}},
-    {"leave", 1, {"feed"}},
-    {"publish", 4, {"host", "noun", "count", "size"}},
-    {"offer", 3, {"host", "count", "size"}},
-    {"talk", 7, {"op", "to", "lines", "gap", "style", "end", "slow"}},
-    {"crash", 2, {"host", "down"}},
-    {"freeze", 2, {"host", "for"}},
-    {"part", 3, {"a", "b", "for"}},
-    {"cut", 2, {"host", "which"}},
-    {"weather", 5, {"lost", "doubled", "late", "least", "spread"}},
-    {"gather", 6, {"feed", "from", "to", "all", "noun", "slow"}},
-    {"namesake", 3, {"host", "for", "silent"}},
-    {"depart", 2, {"host", "down"}},
-    {"mute", 3, {"from", "to", "for"}},
-    {"jump", 2, {"host", "ahead"}},
-    {"retire", 3, {"host", "limit", "down"}},
-    {"roster", 3, {"what", "host", "other"}},
-    {"attack", 3, {"what", "host", "count"}},
+constexpr std::array<names, 21> fields_by_deed{{
+    {"op", "from", "to", "by", "what", "deadline", "size", "work", "steps", "end"}, // ask
+    {"op"},                                                                         // cancel
+    {"feed", "from", "to", "by", "noun", "every", "keep", "slow"},                  // follow
+    {"feed", "for"},                                                                // hold
+    {"feed"},                                                                       // leave
+    {"host", "noun", "count", "size"},                                              // publish
+    {"host", "count", "size"},                                                      // offer
+    {"op", "to", "lines", "gap", "style", "end", "slow"},                           // talk
+    {"host", "down"},                                                               // crash
+    {"host", "for"},                                                                // freeze
+    {"a", "b", "for"},                                                              // part
+    {"host", "which"},                                                              // cut
+    {"lost", "doubled", "late", "least", "spread"},                                 // weather
+    {"feed", "from", "to", "all", "noun", "slow"},                                  // gather
+    {"host", "for", "silent"},                                                      // namesake
+    {"host", "down"},                                                               // depart
+    {"from", "to", "for"},                                                          // mute
+    {"host", "ahead"},                                                              // jump
+    {"host", "limit", "down"},                                                      // retire
+    {"what", "host", "other"},                                                      // roster
+    {"what", "host", "count"},                                                      // attack
 }};
-
-const kind& kind_of(deed what) noexcept { return kinds[static_cast<std::size_t>(what)]; }
 
 std::string_view word(std::string_view& rest) {
     const auto end = std::min(rest.find(' '), rest.size());
@@ -64,19 +58,18 @@ std::uint64_t number(std::string_view text) {
 action action_from(std::string_view first, std::string_view rest) {
     action a{.at_ms = static_cast<std::uint32_t>(number(first))};
     const auto name = word(rest);
-    const auto found = std::find_if(kinds.begin(), kinds.end(), [&](const kind& k) { return k.name == name; });
-    if (found == kinds.end()) {
+    if (!boost::describe::enum_from_string(std::string{name}.c_str(), a.what)) {
         throw std::runtime_error{"'" + std::string{name} + "' is nothing that happens"};
     }
-    a.what = static_cast<deed>(found - kinds.begin());
+    const auto known = fields_of(a.what);
     while (!rest.empty()) {
         const auto part = word(rest);
         const auto equals = part.find('=');
-        const auto field = std::find(found->fields.begin(), found->fields.end(), part.substr(0, equals));
-        if (equals == std::string_view::npos || field == found->fields.end()) {
+        const auto field = std::ranges::find(known, part.substr(0, equals));
+        if (equals == std::string_view::npos || field == known.end()) {
             throw std::runtime_error{"'" + std::string{part} + "' says nothing about " + std::string{name}};
         }
-        a.numbers[static_cast<std::size_t>(field - found->fields.begin())] =
+        a.numbers[static_cast<std::size_t>(field - known.begin())] =
             static_cast<std::uint32_t>(number(part.substr(equals + 1)));
     }
     return a;
@@ -85,18 +78,17 @@ action action_from(std::string_view first, std::string_view rest) {
 } // namespace
 
 std::span<const std::string_view> fields_of(deed what) noexcept {
-    return {kind_of(what).fields.data(), kind_of(what).count};
+    const auto& all = fields_by_deed[static_cast<std::size_t>(what)];
+    return {all.begin(), std::ranges::find(all, std::string_view{})};
 }
 
-std::string_view to_string(deed what) noexcept { return kind_of(what).name; }
-
 std::uint32_t action::operator[](std::string_view field) const {
-    const auto fields = fields_of(what);
-    const auto found = std::find(fields.begin(), fields.end(), field);
-    if (found == fields.end()) {
+    const auto known = fields_of(what);
+    const auto found = std::ranges::find(known, field);
+    if (found == known.end()) {
         throw std::logic_error{"no field " + std::string{field}};
     }
-    return numbers[static_cast<std::size_t>(found - fields.begin())];
+    return numbers[static_cast<std::size_t>(found - known.begin())];
 }
 
 std::string to_text(const plan& p) {

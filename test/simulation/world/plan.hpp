@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <boost/describe/enum.hpp>
+#include <boost/describe/enum_to_string.hpp>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -12,33 +15,12 @@
 namespace cles::simulation {
 
 /// The kinds of actions. Parts of the simulation perform them (part.hpp).
-enum class deed : std::uint8_t {
-    ask,
-    cancel,
-    follow,
-    hold,
-    leave,
-    publish,
-    offer,
-    talk,
-    crash,
-    freeze,
-    part,
-    cut,
-    weather,
-    gather,
-    namesake,
-    depart,
-    mute,
-    jump,
-    retire,
-    roster,
-    attack,
-};
+BOOST_DEFINE_FIXED_ENUM_CLASS(deed, std::uint8_t, ask, cancel, follow, hold, leave, publish, offer, talk, crash, freeze,
+                              part, cut, weather, gather, namesake, depart, mute, jump, retire, roster, attack);
+inline std::string_view to_string(deed what) noexcept { return boost::describe::enum_to_string(what, ""); }
 
 /// The numbers of an action, by name.
 std::span<const std::string_view> fields_of(deed what) noexcept;
-std::string_view to_string(deed what) noexcept;
 
 /// An external event at a point in time: a request of a program, or a fault.
 struct action {

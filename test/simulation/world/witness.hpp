@@ -7,6 +7,7 @@
 #include <boost/describe/enum_to_string.hpp>
 
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <string>
 #include <string_view>
@@ -93,9 +94,7 @@ class witness {
         while (!text.empty()) {
             std::uint64_t eight = 0;
             const auto size = std::min<std::size_t>(8, text.size());
-            for (std::size_t i = 0; i < size; ++i) {
-                eight |= std::uint64_t{static_cast<unsigned char>(text[i])} << (8U * i);
-            }
+            std::memcpy(&eight, text.data(), size);
             mix(eight);
             text.remove_prefix(size);
         }

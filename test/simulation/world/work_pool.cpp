@@ -46,11 +46,7 @@ void work_pool::submit(order what) {
         return;
     }
     j.what = std::move(what);
-    j.what.answer->on_stop([weak = weak_from_this(), number] {
-        if (const auto self = weak.lock()) {
-            self->stop(number);
-        }
-    });
+    j.what.answer->on_stop(if_alive(weak_from_this(), [number](work_pool& self) { self.stop(number); }));
     host_.later({}, [self = shared_from_this()] { self->work(); });
     report_change();
 }
@@ -188,11 +184,10 @@ void work_pool::offer(job_taker& to) {
             complain(rule::effects_once, "passes on a job that has moved already");
         }
         ++sent_;
-        j->moved = to.take(j->what.answer, j->what.body, [weak = weak_from_this(), number = j->number](bool refused) {
-            if (const auto self = weak.lock()) {
-                self->end_move(number, refused);
-            }
-        });
+        j->moved = to.take(j->what.answer, j->what.body,
+                           if_alive(weak_from_this(), [number = j->number](work_pool& self, bool refused) {
+                               self.end_move(number, refused);
+                           }));
     }
 }
 

@@ -50,24 +50,24 @@ bool report::broke(rule which) const noexcept {
 world::world(const plan& what, planted fault, witness::reader reader)
     : node_hosts(what.seed + leak(fault), fault), plan_(what), runs_(what.hosts) {
     watcher_.read_by(std::move(reader));
-    for (const auto make_part : {make_asking, make_following, make_neighbouring}) {
-        parts_.push_back(make_part(*this));
-    }
+    parts_.add(make_asking(*this));
+    parts_.add(make_following(*this));
     if (!plan_.secured) { // clients without a key get no answer
-        parts_.insert(parts_.begin() + 2, make_talking(*this));
+        parts_.add(make_talking(*this));
+    }
+    parts_.add(make_neighbouring(*this));
+    if (!plan_.secured) {
         return;
     }
 #if CLES_SIMULATION_SECURED
     net_.secure();
     auto made = make_securing(*this);
     securing_ = made.get();
-    parts_.push_back(std::move(made));
+    parts_.add(std::move(made));
 #else
     throw std::runtime_error{"this simulation is built without security"};
 #endif
 }
-
-world::~world() { end_all(); }
 
 std::shared_ptr<node_run> world::make(const std::string& name, unsigned host, unsigned run) {
     std::shared_ptr<simulated_security> security;
@@ -87,7 +87,7 @@ std::shared_ptr<node_run> world::make(const std::string& name, unsigned host, un
                           .bounds = plan_.small_limits ? small_limits(plan_.secured) : limits{},
                           .strangers = plan_.strangers,
                           .multicast = plan_.group,
-                          .judge = this,
+                          .judges = &parts_,
                           .security = std::move(security),
                           .peers = std::move(peers)});
 }
@@ -96,7 +96,7 @@ void world::start(unsigned host) {
     nodes_[host] = make(name_of(host), host, runs_[host] + 1);
     if (nodes_[host] == nullptr) {
         constexpr milliseconds until_next_try{500};
-        time_.at(time_.now() + until_next_try, [this, host] {
+        time_.later(until_next_try, [this, host] {
             if (node(host) == nullptr) {
                 start(host);
             }
@@ -107,7 +107,7 @@ void world::start(unsigned host) {
     auto& n = *nodes_[host];
     watcher_.saw(n.name(), "starts", n.node()->epoch);
     n.start();
-    each(&part::on_start, n);
+    parts_.each(&part::on_start, n);
 }
 
 std::shared_ptr<node_run> world::begin_namesake(const std::string& name, unsigned host, unsigned run) {
@@ -119,14 +119,16 @@ std::shared_ptr<node_run> world::begin_namesake(const std::string& name, unsigne
 
 void world::end_run(node_run& n) {
     n.crash();
-    each(&part::on_crash, n);
+    parts_.each(&part::on_crash, n);
     collect(n);
 }
+
+void part::complain(rule which, const std::string& what) { world_.watcher().broken(which, what); }
 
 // -- faults --------------------------------------------------------------------------------------------------------
 
 void world::perform(const action& a) {
-    each(&part::perform, a);
+    parts_.each(&part::perform, a);
     switch (a.what) {
     case deed::crash: crash(a["host"], milliseconds{a["down"]}); break;
     case deed::freeze: freeze(a["host"], milliseconds{a["for"]}); break;
@@ -163,22 +165,20 @@ void world::crash(unsigned host, milliseconds down) {
 }
 
 void world::depart(unsigned host, milliseconds down) {
-    auto* n = node(host);
-    if (!has_group() || n == nullptr || n->frozen()) {
-        return;
+    if (auto* n = active(host); has_group() && n != nullptr) {
+        n->stop();
+        crash(host, down);
     }
-    n->stop();
-    crash(host, down);
 }
 
 void world::retire(unsigned host, milliseconds limit, milliseconds down) {
-    auto* n = node(host);
-    if (n == nullptr || n->frozen() || n->local().closing()) {
+    auto* n = active(host);
+    if (n == nullptr || n->local().closing()) {
         return;
     }
     watcher_.saw(n->name(), "leaves in order");
     departures_[host] = {runs_[host], time_.now(), time_.now() + limit};
-    each(&part::on_leaving, *n);
+    parts_.each(&part::on_leaving, *n);
     const auto end = [this, host, down, run = runs_[host]] {
         if (runs_[host] == run) {
             end_node(host, down);
@@ -201,30 +201,6 @@ void world::end_departure_by(node_run& n, milliseconds span, const agenda::actio
     });
 }
 
-void world::on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) {
-    each(&part::on_group_heard, at, from, datagram);
-}
-
-void world::on_group_sent(node_run& by, std::string_view line) { each(&part::on_group_sent, by, line); }
-
-void world::on_request(node_run& at, const access& what) { each(&part::on_request, at, what); }
-
-void world::on_link_sends(node_run& by, const identity& to, std::string_view line) {
-    each(&part::on_link_sends, by, to, line);
-}
-
-void world::on_link_receives(node_run& at, const identity& from, std::string_view line) {
-    each(&part::on_link_receives, at, from, line);
-}
-
-void world::on_group_accepted(node_run& at, std::string_view member, std::string_view line) {
-    each(&part::on_group_accepted, at, member, line);
-}
-
-void world::on_neighbour(node_run& at, std::string_view node, core::membership::change what) {
-    each(&part::on_neighbour, at, node, what);
-}
-
 // -- a run ---------------------------------------------------------------------------------------------------------
 
 void world::collect(node_run& n) {
@@ -238,11 +214,7 @@ report world::live() {
     for (unsigned host = 0; host < hosts(); ++host) {
         start(host);
     }
-    time_.watch([this] {
-        if (auto* n = node(static_cast<unsigned>(time_.steps() / 64 % hosts()))) {
-            n->check_bounds();
-        }
-    });
+    time_.watch([this] { check_next(hosts()); });
     const auto begun = time_.now();
     auto last = begun;
     for (const auto& a : plan_.actions) {
@@ -252,20 +224,20 @@ report world::live() {
     time_.run_until(last + milliseconds{1});
     report_.node_seconds = std::chrono::duration<double>(time_.now() - begun).count() * hosts();
     watcher_.saw("world", "the trouble is over");
-    each(&part::on_mending);
+    parts_.each(&part::on_mending);
     end_trouble();
-    each(&part::on_calm);
+    parts_.each(&part::on_calm);
     pass(memory_of_datagrams);
-    each(&part::probe);
+    parts_.each(&part::probe);
     pass(probing);
-    each(&part::judge_probe);
+    parts_.each(&part::judge_probe);
     if (secured()) {
-        each(&part::reboot);
+        parts_.each(&part::reboot);
         pass(rebooting);
     }
-    each(&part::wind_down);
+    parts_.each(&part::wind_down);
     pass(quiet);
-    each(&part::judge_rest);
+    parts_.each(&part::judge_rest);
     for (const auto& [host, n] : nodes_) {
         n->check_rest();
         collect(*n);

@@ -13,7 +13,6 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <type_traits>
 #include <vector>
 
 namespace cles::simulation {
@@ -34,10 +33,10 @@ struct report {
 };
 
 /// Runs one plan: nodes, their activities, and faults.
-class world final : public node_hosts, private part {
+class world final : public node_hosts {
   public:
     explicit world(const plan& what, planted fault = planted::none, witness::reader reader = {});
-    ~world() override;
+    ~world() { end_all(); }
 
     report live();
 
@@ -64,14 +63,8 @@ class world final : public node_hosts, private part {
     void restart(unsigned host) { crash(host, std::chrono::milliseconds{1}); }
 
   private:
-    template <class... Arguments>
-    void each(void (part::*what)(Arguments...), std::type_identity_t<Arguments>... arguments) {
-        for (const auto& p : parts_) {
-            ((*p).*what)(arguments...);
-        }
-    }
     void start(unsigned host) override;
-    void perform(const action& what) override;
+    void perform(const action& what);
     void crash(unsigned host, std::chrono::milliseconds down);
     /// Stops the node there.
     void depart(unsigned host, std::chrono::milliseconds down);
@@ -80,18 +73,11 @@ class world final : public node_hosts, private part {
     void end_departure_by(node_run& n, std::chrono::milliseconds span, const agenda::action& end);
     void collect(node_run& n);
     [[nodiscard]] std::shared_ptr<node_run> make(const std::string& name, unsigned host, unsigned run);
-    void on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) override;
-    void on_group_sent(node_run& by, std::string_view line) override;
-    void on_request(node_run& at, const access& what) override;
-    void on_link_sends(node_run& by, const identity& to, std::string_view line) override;
-    void on_link_receives(node_run& at, const identity& from, std::string_view line) override;
-    void on_group_accepted(node_run& at, std::string_view member, std::string_view line) override;
-    void on_neighbour(node_run& at, std::string_view node, core::membership::change what) override;
 
     const plan& plan_;
     std::vector<unsigned> runs_;
     std::map<unsigned, departure> departures_; // by host
-    std::vector<std::unique_ptr<part>> parts_;
+    part_list parts_;
     securing* securing_ = nullptr; // one of them; null without security
     report report_;
 };
