@@ -23,7 +23,7 @@ namespace {
 
 using steady = std::chrono::steady_clock;
 
-constexpr std::uint64_t deadline_ms = 10'000;
+constexpr std::uint64_t frame_deadline_ms = 10'000;
 constexpr double fps = 25;           ///< of the times in the frames
 constexpr std::size_t pictures = 50; ///< sent repeatedly, because only the load matters
 
@@ -39,14 +39,14 @@ struct work {
 };
 
 boost::asio::awaitable<void> send_stream(work& all, std::string stream) {
-    const auto options = cles::call_options{}.deadline(std::chrono::milliseconds{deadline_ms}).at(all.args.at);
+    const auto options = cles::call_options{}.deadline(std::chrono::milliseconds{frame_deadline_ms}).at(all.args.at);
     for (std::uint64_t number = 0; steady::now() < all.until; ++number) {
         const fmv::frame_message what{.stream = stream,
                                       .frame = number,
                                       .utc = static_cast<double>(number) / fps,
                                       .width = scene::size.width,
                                       .height = scene::size.height,
-                                      .deadline_ms = deadline_ms,
+                                      .deadline_ms = frame_deadline_ms,
                                       .camera = all.ground.reported(static_cast<double>(number % pictures) / fps),
                                       .format = all.args.format,
                                       .picture = all.pictures_sent[number % pictures]};
@@ -60,11 +60,11 @@ boost::asio::awaitable<void> send_stream(work& all, std::string stream) {
     }
 }
 
-struct summary {
+struct load_summary {
     std::uint64_t frames = 0;
     double frames_a_second = 0, mean_run_ms = 0;
 };
-BOOST_DESCRIBE_STRUCT(summary, (), (frames, frames_a_second, mean_run_ms))
+BOOST_DESCRIBE_STRUCT(load_summary, (), (frames, frames_a_second, mean_run_ms))
 
 } // namespace
 
@@ -108,8 +108,8 @@ int run_load(const load_options& args) {
         std::rethrow_exception(all.failure);
     }
     const std::chrono::duration<double> took = steady::now() - begun;
-    std::puts(cles::to_json(summary{all.done, static_cast<double>(all.done) / took.count(),
-                                    all.done == 0 ? 0 : all.run_ms / static_cast<double>(all.done)})
+    std::puts(cles::to_json(load_summary{all.done, static_cast<double>(all.done) / took.count(),
+                                         all.done == 0 ? 0 : all.run_ms / static_cast<double>(all.done)})
                   .c_str());
     return 0;
 }

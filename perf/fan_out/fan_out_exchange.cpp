@@ -139,7 +139,7 @@ class fan_out_pass {
     std::exception_ptr failure_;
 };
 
-class binder : public feed_reader<binder, publication, fan_out_pass> {
+class fan_out_binder : public feed_reader<fan_out_binder, publication, fan_out_pass> {
   public:
     using feed_reader::feed_reader;
 
@@ -186,9 +186,9 @@ void serve_fan_out(service_options options, const run_options& how, const child_
 fan_out_tally take_fan_out(asio::io_context& io, const std::vector<cles::service*>& clients, const fan_out_order& order,
                            const fan_out_binding& binding, latency_recorder* record) {
     fan_out_pass all{io, *clients.front(), order, binding.multicast, record};
-    std::vector<std::unique_ptr<binder>> binders;
+    std::vector<std::unique_ptr<fan_out_binder>> binders;
     for (std::uint64_t i = 0; i < order.binders; ++i) {
-        binders.push_back(std::make_unique<binder>(all, binding.style, binding.keep, binding.multicast));
+        binders.push_back(std::make_unique<fan_out_binder>(all, binding.style, binding.keep, binding.multicast));
         binders.back()->start(io, *clients[i % clients.size()]);
     }
     run_pass(io, binding.how, all, clients, binders);

@@ -83,9 +83,10 @@ class update_pass {
 };
 
 template <class T>
-class binder : public feed_reader<binder<T>, T, update_pass> {
+class update_binder : public feed_reader<update_binder<T>, T, update_pass> {
   public:
-    explicit binder(update_pass& all) : feed_reader<binder, T, update_pass>(all, all.load().style, all.load().keep) {}
+    explicit update_binder(update_pass& all)
+        : feed_reader<update_binder, T, update_pass>(all, all.load().style, all.load().keep) {}
 
     /// False when the last update has arrived.
     bool take(const feed_item<T>& item) {
@@ -126,9 +127,9 @@ template <class T>
 update_tally take(asio::io_context& io, const std::vector<std::unique_ptr<cles::service>>& clients,
                   const update_load& load) {
     update_pass all{io, *clients.front(), load};
-    std::vector<std::unique_ptr<binder<T>>> binders;
+    std::vector<std::unique_ptr<update_binder<T>>> binders;
     for (std::size_t i = 0; i < load.binders; ++i) {
-        binders.push_back(std::make_unique<binder<T>>(all));
+        binders.push_back(std::make_unique<update_binder<T>>(all));
         binders.back()->start(io, *clients[i]);
     }
     run_pass(io, load.how, all, clients, binders);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "datagram_tap.hpp"
 
+#include "perf/support/bare_socket.hpp"
+
 #include <array>
 #include <cstddef>
 
@@ -11,8 +13,6 @@
 
 namespace cles::perf {
 namespace {
-
-descriptor datagram_socket() { return descriptor{checked(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), "socket")}; }
 
 sockaddr_in loopback(std::uint16_t port) {
     sockaddr_in address{};

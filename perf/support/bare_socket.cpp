@@ -137,6 +137,8 @@ descriptor connect_to(const url& where) {
     throw std::runtime_error(to_string(where) + ": not a URL of tcp, udp or unix");
 }
 
+descriptor datagram_socket() { return descriptor{checked(::socket(AF_INET, datagrams, 0), "socket")}; }
+
 void send_all(int socket, std::span<const std::byte> bytes) {
     while (!bytes.empty()) {
         const auto sent = ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);

@@ -28,6 +28,9 @@ descriptor accept_from(const listener& at);
 /// \throws std::system_error, or std::runtime_error if the host has no address, or for another scheme
 descriptor connect_to(const url& where);
 
+/// Of IPv4, not bound. \throws std::system_error
+descriptor datagram_socket();
+
 void send_all(int socket, std::span<const std::byte> bytes);
 /// False if the peer closed the connection before the first byte. A datagram has to be complete.
 bool receive_all(int socket, std::span<std::byte> bytes);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "multicast_socket.hpp"
 
+#include "bare_socket.hpp"
+
 #include <arpa/inet.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -8,9 +10,7 @@
 namespace cles::perf {
 namespace {
 
-constexpr int buffer = 1 << 20; // the system may limit it
-
-descriptor datagram_socket() { return descriptor{checked(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), "socket")}; }
+constexpr int buffer_bytes = 1 << 20; // the system may limit it
 
 sockaddr_in address_of(const multicast_group& group) {
     sockaddr_in address{};
@@ -54,7 +54,7 @@ descriptor join(const multicast_group& group) {
     auto socket = datagram_socket();
     auto address = address_of(group);
     set(socket, SOL_SOCKET, SO_REUSEADDR, 1, "SO_REUSEADDR");
-    set(socket, SOL_SOCKET, SO_RCVBUF, buffer, "SO_RCVBUF");
+    set(socket, SOL_SOCKET, SO_RCVBUF, buffer_bytes, "SO_RCVBUF");
     set(socket, IPPROTO_IP, IP_MULTICAST_ALL, 0, "IP_MULTICAST_ALL");
     bind_to(socket, address);
     set(socket, IPPROTO_IP, IP_ADD_MEMBERSHIP, on_loopback(address.sin_addr), "IP_ADD_MEMBERSHIP");
