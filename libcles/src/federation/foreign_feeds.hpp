@@ -65,7 +65,7 @@ class foreign_feeds {
     };
     using bindings = std::map<foreign_noun, binding>; // those of one subject are neighbours
 
-    /// \param tells its bridge, unless the noun is bound there under another name
+    /// \param tells whether its bridge is notified, unless the noun is bound there under another name
     void erase(bindings::iterator which, bool tells);
     template <class Condition>
     void erase_if(Condition concerns, bool tells);

@@ -29,8 +29,8 @@ class sealed_channel {
         return seal_->seal(subject, reply, message);
     }
 
-    /// Passes a message to the bridge if it counts, and tells it what the message says even so. This object may be gone
-    /// afterwards.
+    /// Opens a message and passes it to the bridge. If it is refused, or its sender is not proven to be alive, the
+    /// bridge is notified of that. This object may be gone afterwards.
     void receive(received_message m, bridge& to);
     /// That bridge is lost. It has to prove again that it is alive.
     void forget(const bridge_id& lost);

@@ -5,11 +5,11 @@
 
 #include <string>
 
-/// The parts of the service that this program may have been built without.
-
 namespace cles::runtime {
 
 struct config;
+
+// The parts of the service that this program may have been built without.
 
 /// The security that the configuration asks for; empty if it is off. \throws config_error if its files cannot be used,
 /// the key is that of another node, a user is unknown, or this program was built without security

@@ -54,15 +54,15 @@ void announcer::on_deadline(time_point now) {
 
 // -- how long names may become known -------------------------------------------------------------------------------
 
-void discovery_grace::begin(time_point now, bool has_seeds) {
+void discovery_grace::begin(time_point now, bool awaits_seeds) {
     over_ = false;
     is_for_seeds_ = false;
-    has_seeds_ = has_seeds;
+    awaits_seeds_ = awaits_seeds;
     deadlines_.arm(*this, now + length);
 }
 
 void discovery_grace::on_seeds_heard() {
-    has_seeds_ = false;
+    awaits_seeds_ = false;
     if (is_for_seeds_ && !over_) {
         stop();
         on_change_();
@@ -75,7 +75,7 @@ void discovery_grace::stop() noexcept {
 }
 
 void discovery_grace::on_deadline(time_point now) {
-    over_ = !has_seeds_ || std::exchange(is_for_seeds_, true);
+    over_ = !awaits_seeds_ || std::exchange(is_for_seeds_, true);
     if (!over_) {
         deadlines_.arm(*this, now + (for_seeds - length));
     }
@@ -137,7 +137,6 @@ void discovery::gossip(const gossip_options& how) {
             throw error(errc::unknown_scheme, "'" + where.scheme + "' in '" + seed + "'");
         }
     }
-    has_seeds_ = !how.seeds.empty();
     if (gossip_) {
         gossip_->set_seeds(how.seeds, host_.now());
         gossip_->reach().allow_only(how.links);
@@ -168,7 +167,7 @@ void discovery::begin() {
         if (group_ != nullptr) {
             group_->send("BIND all:cles\n");
         }
-        discovery_grace_.begin(now, has_seeds_);
+        discovery_grace_.begin(now, gossip_ && gossip_->awaits_seeds());
         if (!left_) {
             announcer_.start(now);
         }

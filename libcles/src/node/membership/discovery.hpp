@@ -41,7 +41,7 @@ class discovery_grace final : private deadline {
 
     /// The grace period will start; its time is not running yet.
     void expect() noexcept { over_ = false; }
-    void begin(time_point now, bool has_seeds = false);
+    void begin(time_point now, bool awaits_seeds = false);
     /// Every seed has answered or refused.
     void on_seeds_heard();
     void stop() noexcept;
@@ -53,7 +53,7 @@ class discovery_grace final : private deadline {
     deadline_queue& deadlines_;
     std::function<void()> on_change_;
     bool over_ = true;
-    bool has_seeds_ = false; // that have not been heard
+    bool awaits_seeds_ = false;
     bool is_for_seeds_ = false;
 };
 
@@ -157,7 +157,6 @@ class discovery final : private announcement_listener, private membership::watch
     discovery_grace discovery_grace_;
     std::unique_ptr<core::gossip> gossip_; // null: it takes no part
     std::uint32_t seed_;
-    bool has_seeds_ = false;
     multicast_group* group_ = nullptr;
     std::map<std::string, std::uint32_t, std::less<>> incarnations_; // epoch by name
     std::uint64_t seq_ = 0;

@@ -90,6 +90,8 @@ class gossip : private deadline {
     /// Leaves, and stops asking.
     virtual void stop(time_point now);
     virtual void set_seeds(const std::vector<std::string>& urls, time_point now);
+    /// Whether a seed has neither told of itself nor refused.
+    [[nodiscard]] bool awaits_seeds() const { return !seeds_.all_heard(); }
     /// By which neighbour each node is reached.
     [[nodiscard]] reachability& reach() noexcept { return reach_; }
 
