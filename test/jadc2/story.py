@@ -34,14 +34,18 @@ class StoryTest(unittest.TestCase):
         self.assertGreater(told["outcome"]["plots"], 10)  # its own sensor's
         return told
 
-    def check_found(self, report, slow):
-        self.assertGreater(report["judged"], 0)
-        if not slow:
+    def check_found(self, report):
+        frames = report["frames"]
+        self.assertGreater(frames["done"], 0)
+        if frames["skipped"] * 5 > frames["captured"]:  # between the others, vehicles move too far to be followed
+            print(f"{self.id().rpartition('.')[2]}: this machine was too busy for finding targets: {frames}")
+            return
+        if PATIENCE <= 30:  # a sanitizer leaves time for few frames, in which no vehicle may be in sight for long enough
+            self.assertGreater(report["to_be_found"], 0)
+        if report["to_be_found"]:
             self.assertGreaterEqual(report["recall"], 0.9)  # as in `jadc2.detection`
-            # `jadc2.detection` requires 0.1 over many scenes. Here, one false track in few frames exceeds that.
-            self.assertLessEqual(report["false_per_frame"], 0.5)
-        elif report["to_be_found"]:  # few frames are processed, between which vehicles move far: perhaps none for long enough
-            self.assertGreater(report["recall"], 0)
+        # `jadc2.detection` requires 0.1 over many scenes. Here, one false track in few frames exceeds that.
+        self.assertLessEqual(report["false_per_frame"], 0.5)
 
     def run_story(self, fleet):
         satellite, striker = fleet.satellite(), fleet.striker()
@@ -70,7 +74,7 @@ class StoryTest(unittest.TestCase):
         self.assertEqual(frames["nodes"], ["sat1"], frames)
         self.assertLessEqual(set(frames["failures"]), {"no_target"}, recon.events)  # before it was found
         self.assertEqual(satellite.pull("sat1:FMV_Processing")["frames"], frames["done"])
-        self.check_found(report, PATIENCE > 30)
+        self.check_found(report)
 
         # No node knows others than those of its links.
         self.assertEqual(satellite.peers(), set())
