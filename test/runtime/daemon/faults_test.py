@@ -11,9 +11,11 @@ from load import DEADLINE, RUNS, SLACK, Load
 from support import PATIENCE
 
 
-class Faults(unittest.TestCase):
+class FaultTest(unittest.TestCase):
+    DRAIN = "500ms"
+
     def setUp(self):
-        self.fleet = Fleet(4)
+        self.fleet = Fleet(4, more=f"drain: {self.DRAIN}\n")
         self.addCleanup(self.fleet.__exit__)
 
     def load_at(self, name):
@@ -62,6 +64,8 @@ class Faults(unittest.TestCase):
         marks = self.fleet.marks()
         return any(name in marks[job.number] for job in load.jobs if job.sent >= since and job.target == "any")
 
+
+class Faults(FaultTest):
     def test_a_node_is_killed(self):
         load = self.load_at("sat1")
         self.crowd(load)
@@ -96,34 +100,6 @@ class Faults(unittest.TestCase):
         print(f"no request goes to a node that was paused {after:.2f} s after it; suspect after {suspect - paused:.2f} s")
         self.assertLessEqual(after, 3.5 + SLACK / 2)
         self.assertIn(held.code, ("deadline", "unavailable"))
-        self.account(load)
-
-    def test_nodes_are_restarted_one_after_the_other(self):
-        load = self.load_at("sat1")
-        load.PACE, load.MIX = 0.001, (("any", "once"),)
-        load.run(0.3)
-        for _ in range(3):
-            for name in ("sat2", "sat3", "sat4"):
-                self.fleet.restart(name, lambda condition, what: load.run(until=condition, what=what))
-                load.run(0.4)
-        self.assertGreater(len(load.jobs), 1000)
-        load.finish()
-        # Jobs that had not started were sent elsewhere, and the others were answered.
-        self.assertEqual([job for job in load.jobs if job.code not in (None, "busy")], [])
-        self.account(load)
-
-    def test_the_routing_node_is_restarted(self):
-        load = self.load_at("sat2")
-        load.PACE, load.MIX = 0.001, (("any", "once"), ("named", "once"))
-        load.run(0.3)
-        self.fleet["sat2"].send_signal(signal.SIGTERM)
-        load.run(until=lambda: not load.linked, what="the link has ended")
-        self.assertTrue(load.left)
-        # Every job without an answer is known not to have started, so another node may be asked.
-        self.assertEqual([job for job in load.jobs if job.code not in (None, "busy")], [])
-        load.connect(self.fleet["sat3"])
-        load.names = ["sat1", "sat3", "sat4"]
-        load.run(0.3)
         self.account(load)
 
     def test_a_busy_node_gets_no_jobs_while_others_are_free(self):
@@ -170,6 +146,40 @@ class Faults(unittest.TestCase):
         pause = time.monotonic() - paused
         load.run(0.5)
         self.account(load, pause)
+
+
+class Stops(FaultTest):
+    """A node that is stopped loses no job, however long those take that it has passed on."""
+
+    DRAIN = "30s"
+
+    def test_nodes_are_restarted_one_after_the_other(self):
+        load = self.load_at("sat1")
+        load.PACE, load.LIMIT, load.MIX = 0.001, 50, (("any", "once"),)
+        load.run(0.3)
+        for _ in range(3):
+            for name in ("sat2", "sat3", "sat4"):
+                self.fleet.restart(name, lambda condition, what: load.run(until=condition, what=what))
+                load.run(0.4)
+        self.assertGreater(len(load.jobs), 1000)
+        load.finish()
+        # Jobs that had not started were sent elsewhere, and the others were answered.
+        self.assertEqual([job for job in load.jobs if job.code not in (None, "busy")], [])
+        self.account(load)
+
+    def test_the_routing_node_is_restarted(self):
+        load = self.load_at("sat2")
+        load.PACE, load.LIMIT, load.MIX = 0.001, 50, (("any", "once"), ("named", "once"))
+        load.run(0.3)
+        self.fleet["sat2"].send_signal(signal.SIGTERM)
+        load.run(until=lambda: not load.linked, what="the link has ended")
+        self.assertTrue(load.left)
+        # Every job without an answer is known not to have started, so another node may be asked.
+        self.assertEqual([job for job in load.jobs if job.code not in (None, "busy")], [])
+        load.connect(self.fleet["sat3"])
+        load.names = ["sat1", "sat3", "sat4"]
+        load.run(0.3)
+        self.account(load)
 
 
 if __name__ == "__main__":
