@@ -21,31 +21,62 @@ function(cles_target_defaults target)
     target_compile_definitions(${target} PRIVATE $<$<CONFIG:Debug>:_GLIBCXX_ASSERTIONS>)
 endfunction()
 
-# cles_target_in_units(target): with CLES_UNITY its sources are compiled several at a time. Compiling Asio's and the standard
-# library's templates anew for each source is most of the work. A build without CLES_UNITY finds what a source fails to include.
+# cles_target_in_units(target [FOLDER...]): with CLES_UNITY its sources are compiled 24 at a time. Compiling Asio's and the
+# standard library's templates anew for each source is most of the work. A build without CLES_UNITY finds what a source fails
+# to include.
+#
+# With folders of src/ there is one unit for the sources of each, and one for all others, so that the functions of a folder can
+# be inlined into each other. A unit of any sources adds 13 % to the instructions of a PULL at the service.
+#
+# A source with SKIP_UNITY_BUILD_INCLUSION, or with options of its own, is compiled separately.
 function(cles_target_in_units target)
     if(CLES_UNITY)
-        set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+        # At the end of the directory, when all its sources and their properties are known.
+        cmake_language(EVAL CODE "cmake_language(DEFER CALL cles_combine_sources ${target} [[${ARGN}]])")
     endif()
 endfunction()
 
-# cles_target_in_folder_units(target FOLDER...): as above, with one unit for the sources of each folder of src/ and one for
-# all others, so that the functions of a folder can be inlined into each other. A unit of any 12 sources adds 13 % to the
-# instructions of a PULL at the service.
-function(cles_target_in_folder_units target)
-    if(NOT CLES_UNITY)
-        return()
-    endif()
-    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
+# CMake's own units name their sources by absolute paths, so that a compiler cache would preprocess them anew in each clone.
+function(cles_combine_sources target folders)
     get_target_property(sources ${target} SOURCES)
-    list(FILTER sources INCLUDE REGEX "\\.cpp$")
+    set(separate)
+    set(units)
+    set(count 0)
     foreach(source IN LISTS sources)
-        set(unit other)
-        foreach(folder IN LISTS ARGN)
-            if(source MATCHES "^src/${folder}/")
-                string(REPLACE "/" "_" unit ${folder})
+        set(alone NO)
+        foreach(property IN ITEMS SKIP_UNITY_BUILD_INCLUSION HEADER_FILE_ONLY COMPILE_DEFINITIONS COMPILE_OPTIONS)
+            get_source_file_property(value "${source}" ${property})
+            if(value)
+                set(alone YES)
             endif()
         endforeach()
-        set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${unit})
+        if(alone OR NOT source MATCHES "\\.cpp$")
+            list(APPEND separate "${source}")
+            continue()
+        endif()
+        if(folders)
+            set(unit other)
+            foreach(folder IN LISTS folders)
+                if(source MATCHES "^src/${folder}/")
+                    string(REPLACE "/" "_" unit ${folder})
+                endif()
+            endforeach()
+        else()
+            math(EXPR unit "${count} / 24")
+            math(EXPR count "${count} + 1")
+        endif()
+        list(APPEND units ${unit})
+        cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}")
+        cmake_path(RELATIVE_PATH source BASE_DIRECTORY "${PROJECT_SOURCE_DIR}")
+        string(APPEND text_of_${unit} "#include \"${source}\"\n")
     endforeach()
+    list(REMOVE_DUPLICATES units)
+    set(combined)
+    foreach(unit IN LISTS units)
+        set(file "${CMAKE_CURRENT_BINARY_DIR}/units/${target}_${unit}.cpp")
+        file(CONFIGURE OUTPUT "${file}" CONTENT "${text_of_${unit}}" @ONLY)
+        list(APPEND combined "${file}")
+    endforeach()
+    set_property(TARGET ${target} PROPERTY SOURCES ${combined} ${separate})
+    target_include_directories(${target} PRIVATE "${PROJECT_SOURCE_DIR}")
 endfunction()

@@ -5,6 +5,7 @@
 
 #include <boost/asio/awaitable.hpp>
 
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -16,6 +17,9 @@ namespace tool {
 class address_book;
 class client;
 struct listed_node;
+
+/// How long a check waits for a node's answer.
+inline constexpr std::chrono::seconds query_timeout{1};
 
 enum class verdict : std::uint8_t { ok, warning, failure };
 

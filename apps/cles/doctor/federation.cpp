@@ -18,12 +18,9 @@
 
 namespace tool {
 
-using namespace std::chrono_literals;
 namespace asio = boost::asio;
 
 namespace {
-
-constexpr auto query_timeout = 1s;
 
 struct stated_pool {
     std::string pool;

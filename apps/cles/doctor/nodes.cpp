@@ -28,7 +28,6 @@ using steady = std::chrono::steady_clock;
 
 namespace {
 
-constexpr auto query_timeout = 1s;
 constexpr auto announcement_time = 400ms; // until all nodes have announced themselves, with some reserve
 constexpr double max_offset_s = 0.1;
 

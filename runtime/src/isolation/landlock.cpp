@@ -76,8 +76,8 @@ class ruleset {
         if (opened.get() < 0) {
             return path.string() + ": " + std::generic_category().message(errno);
         }
-        struct stat about {};
-        const bool is_folder = ::fstat(opened.get(), &about) == 0 && S_ISDIR(about.st_mode);
+        struct stat status {};
+        const bool is_folder = ::fstat(opened.get(), &status) == 0 && S_ISDIR(status.st_mode);
         const path_rule rule{.allowed = rights & all_ & (is_folder ? ~std::uint64_t{0} : of_files),
                              .parent = opened.get()};
         if (::syscall(SYS_landlock_add_rule, rules_.get(), rule_of_path, &rule, 0) != 0) {

@@ -29,12 +29,12 @@ class shrinking {
             return false;
         }
         --left_;
-        const bool fails =
+        const bool is_broken =
             broken_ == rule::same_trace ? simulate_twice(p, fault_).broke(broken_) : simulate(p, fault_).broke(broken_);
-        if (fails) {
+        if (is_broken) {
             best_ = p;
         }
-        return fails;
+        return is_broken;
     }
 
     bool drop_actions() {
