@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Demonstrates security: two nodes of a fleet, a member that asks them, an outsider that may not, and a removal; then the
-case studies: a sealed platoon, and a strike that only the mission centre may order.
+"""Demonstrates security: two nodes of a fleet, a member that asks them, an outsider that may not, and a removal.
 
     demo_secured.py [FOLDER]
 
@@ -17,11 +16,12 @@ import sys
 import tempfile
 import time
 
-from jadc2_fleet import RIGHTS, Trouble
-from jadc2_fleet import Fleet as JointCommand
-
 PATIENCE = 20  # seconds; everything takes far less
 BOLD, PLAIN = ("\033[1m", "\033[0m") if sys.stdout.isatty() and not os.environ.get("NO_COLOR") else ("", "")
+
+
+class Trouble(Exception):
+    """Something has not happened as it should."""
 
 
 def heading(text):
@@ -113,38 +113,6 @@ def demonstrate(fleet):
         fleet.show("pull", "self:echo/hello", "--at", urls[name], "--keys", "fleet/sat1", code=1, says="refuses")
 
 
-def drive(programs, environment):
-    heading("A platoon: each vehicle has a key, states are sealed and signed (docs/platoon.md)")
-    words = ["cles-platoon", "run", "--secured", "--vehicles", "3", "--hz", "50", "--seconds", "2"]
-    print("  $ " + " ".join(words), flush=True)
-    done = subprocess.run([os.path.join(programs, words[0]), *words[1:]], env=environment, capture_output=True,
-                          stdin=subprocess.DEVNULL, text=True, timeout=PATIENCE, check=False)
-    if done.returncode != 0:
-        raise Trouble(f"the platoon ended with {done.returncode}: {done.stderr}")
-    for line in done.stdout.splitlines():
-        if line.startswith(("gap", "latency")):
-            print(f"    {line}", flush=True)
-
-
-def strike(programs):
-    heading("Joint command: each role has its own rights, and orders to strike are signed (docs/jadc2.md)")
-    with JointCommand(programs, rights=RIGHTS) as command:
-        striker = command.striker()
-        recon = command.recon([command.satellite()])
-        mission = command.mission(recon, [striker], "--duration", str(PATIENCE))
-        if mission.end() != 0:
-            raise Trouble(f"no order was carried out: {mission.events}")
-        for event in mission.all("bound") + mission.all("strike") + mission.all("assessed"):
-            print("  mission: " + event["text"].splitlines()[0], flush=True)
-        order = '{"id":"o1","lat":33.2,"lon":-106.4,"ve":0,"vn":0,"sigma":3,"sigma_v":1,"utc":0,"deadline_ms":1000}'
-        for member in ("recon", "operator"):
-            print(f"  $ cles delegate strike1:strike -d '...' --keys fleet/{member}")
-            done = striker.ask(member, "delegate", "strike1:strike", "-d", order)
-            print(f"    {done.stderr.strip()}", flush=True)
-            if done.returncode != 5 or "denied" not in done.stderr:
-                raise Trouble(f"{member} was not refused")
-
-
 def main():
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda number, _: sys.exit(128 + number))
@@ -153,8 +121,6 @@ def main():
         fleet = Fleet(programs, folder)
         try:
             demonstrate(fleet)
-            drive(programs, fleet.environment)
-            strike(programs)
         except (Trouble, OSError, subprocess.TimeoutExpired) as failure:
             print(f"cles: {failure}", file=sys.stderr)
             return 1

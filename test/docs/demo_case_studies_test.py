@@ -1,0 +1,41 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Runs the part of the demonstration that shows the case studies.
+
+    demo_case_studies_test.py SCRIPT FOLDER
+
+FOLDER is where the programs are.
+"""
+
+import os
+import sys
+import unittest
+
+from demo_case import PROGRAMS, DemoCase
+
+
+class Demo(DemoCase):
+    def test_it_shows_what_it_promises(self):
+        code, said, complaint = self.show(CLES_AT="nonsense", CLES_KEYS="nowhere")
+        self.assertEqual((code, complaint), (0, ""), said)
+        self.assertRegex(said, r"(?m)^    gap +\d+\.\d{3} m at least$")
+        self.assertRegex(said, r"(?m)^  mission: order mission-\d+-1 is done by strike1, 3 weapons left$")
+        for member in ("recon", "operator"):
+            self.assertIn(f"cles: denied: {member} may not send DELEGATE 'strike' to strike1", said)
+
+    def test_a_platoon_that_fails_is_said(self):
+        fake = self.folder / "cles-platoon"
+        fake.write_text("#!/bin/sh\necho no such luck >&2\nexit 1\n")
+        fake.chmod(0o755)
+        code, _, complaint = self.show(str(self.folder))
+        self.assertEqual((code, complaint), (1, "cles: the platoon ended with 1: no such luck\n\n"))
+
+    def test_programs_that_are_missing_are_said(self):
+        self.assertTrue(os.path.exists(os.path.join(PROGRAMS, "cles-platoon")))
+        code, _, complaint = self.show(str(self.folder))
+        self.assertEqual(code, 1)
+        self.assertIn("cles-platoon", complaint)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
