@@ -40,6 +40,15 @@ BOOST_AUTO_TEST_CASE(what_is_not_known_is_ignored) {
     BOOST_TEST(read->interval.count() == 100);
 }
 
+BOOST_AUTO_TEST_CASE(an_optional_member_that_is_null_is_absent) {
+    const auto read = parse_heartbeat(R"({"node":"hub","interval_ms":null,"names":"0123456789abcdef","replaces":null,)"
+                                      R"("leaving":null,"starting":null,"closing":null,"roster":null})");
+    BOOST_REQUIRE(read.has_value());
+    BOOST_TEST((*read == cles::bridging::heartbeat{.node = "hub", .interval = milliseconds{100}, .names = digest}));
+    BOOST_TEST(!parse_heartbeat(R"({"node":null,"names":"0123456789abcdef"})").has_value());
+    BOOST_TEST(!parse_heartbeat(R"({"node":"hub","names":null})").has_value());
+}
+
 BOOST_AUTO_TEST_CASE(anything_else_is_refused) {
     for (const std::string_view text :
          {"", "{}", "[]", "hello", R"({"node":"hub"})", R"({"node":"h b","names":"0123456789abcdef"})",
@@ -58,6 +67,13 @@ BOOST_AUTO_TEST_CASE(names_are_sorted_and_have_a_digest) {
     BOOST_TEST((parse_names(text_of(names), 10) == names));
     BOOST_TEST(parse_names(text_of(names), 1)->nodes.size() == 1U);
     BOOST_TEST((parse_names(text_of(names_of({})), 10) == names_of({})));
+}
+
+BOOST_AUTO_TEST_CASE(names_without_nodes_are_none) {
+    const auto read = parse_names(R"({"digest":"0123456789abcdef"})", 10);
+    BOOST_REQUIRE(read.has_value());
+    BOOST_TEST(read->digest == digest);
+    BOOST_TEST(read->nodes.empty());
 }
 
 BOOST_AUTO_TEST_CASE(what_is_no_list_of_names_is_refused) {
