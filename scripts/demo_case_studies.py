@@ -7,13 +7,15 @@
 FOLDER contains the programs; default build/release/apps. No processes or files are left behind.
 """
 
+import contextlib
 import os
 import signal
 import subprocess
 import sys
 
-from demo_secured import PATIENCE, free_port, heading
-from jadc2_fleet import RIGHTS, Fleet, Trouble, clean_environment
+from demo_secured import free_port
+from demo_support import heading
+from jadc2_fleet import PATIENCE, RIGHTS, DeferredSignals, Fleet, Trouble, clean_environment
 
 
 def drive(programs):
@@ -21,11 +23,16 @@ def drive(programs):
     words = ["cles-platoon", "run", "--secured", "--vehicles", "3", "--hz", "50", "--seconds", "2"]
     print("  $ " + " ".join(words), flush=True)
     alone = {**clean_environment(), "CLES_MULTICAST": f"lo,239.255.25.37:{free_port()}"}
-    done = subprocess.run([os.path.join(programs, words[0]), *words[1:]], env=alone, capture_output=True,
-                          stdin=subprocess.DEVNULL, text=True, timeout=PATIENCE, check=False)
-    if done.returncode != 0:
-        raise Trouble(f"the platoon ended with {done.returncode}: {done.stderr}")
-    for line in done.stdout.splitlines():
+    with contextlib.ExitStack() as ends:
+        with DeferredSignals():
+            platoon = ends.enter_context(subprocess.Popen(
+                [os.path.join(programs, words[0]), *words[1:]], env=alone, stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+            ends.callback(platoon.terminate)  # it ends its vehicles
+        said, errors = platoon.communicate(timeout=PATIENCE)
+    if platoon.returncode != 0:
+        raise Trouble(f"the platoon ended with {platoon.returncode}: {errors}")
+    for line in said.splitlines():
         if line.startswith(("gap", "latency")):
             print(f"    {line}", flush=True)
 

@@ -21,6 +21,8 @@ import sys
 import tempfile
 import time
 
+from demo_support import Trouble, heading
+
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 NAMES = ["sat1", "sat2", "sat3", "sat4"]
 FIRST, ASKED = "sat1", "sat2"  # the seed of the others; the daemon that gets all requests
@@ -28,7 +30,6 @@ PATIENCE = 30  # seconds; everything takes far less
 SPREAD, UNDER_FIRE = 60, 80  # jobs
 CHAIN = ["car1", "car2", "car3", "car4"]
 JOB_SECONDS = 0.1  # intended duration of a job
-BOLD, PLAIN = ("\033[1m", "\033[0m") if sys.stdout.isatty() and not os.environ.get("NO_COLOR") else ("", "")
 
 CONFIG = """\
 node: {name}
@@ -53,16 +54,8 @@ FATES = {"busy": "refused", "no_target": "refused", "no_task": "refused", "unava
          "deadline": "unknown"}
 
 
-class Trouble(Exception):
-    pass
-
-
 class Interrupted(BaseException):
     pass
-
-
-def heading(text):
-    print(f"\n{BOLD}{text}{PLAIN}", flush=True)
 
 
 def show(text):

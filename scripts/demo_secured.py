@@ -16,16 +16,9 @@ import sys
 import tempfile
 import time
 
+from demo_support import Trouble, heading
+
 PATIENCE = 20  # seconds; everything takes far less
-BOLD, PLAIN = ("\033[1m", "\033[0m") if sys.stdout.isatty() and not os.environ.get("NO_COLOR") else ("", "")
-
-
-class Trouble(Exception):
-    """Something has not happened as it should."""
-
-
-def heading(text):
-    print(f"\n{BOLD}{text}{PLAIN}", flush=True)
 
 
 def free_port():

@@ -5,16 +5,12 @@
     demo_wire.py URL_OF_CAR1 URL_OF_CAR2
 """
 
-import os
 import socket
 import sys
 
+from demo_support import heading
+
 PATIENCE = 10  # seconds
-BOLD, PLAIN = ("\033[1m", "\033[0m") if sys.stdout.isatty() and not os.environ.get("NO_COLOR") else ("", "")
-
-
-def heading(text: str) -> None:
-    print(f"\n{BOLD}{text}{PLAIN}", flush=True)
 
 
 class Wire:

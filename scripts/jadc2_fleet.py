@@ -5,7 +5,6 @@ reconnaissance aircraft, reconnaissance aircraft to mission centre, mission cent
 import json
 import os
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -288,22 +287,26 @@ class Fleet:
 
     def __init__(self, programs, hosts=None, listener=None, rights=None):
         self.programs, self.hosts, self.listener = programs, hosts or Loopback(), listener
-        self.folder = tempfile.mkdtemp(prefix="cles-jadc2-")
         self.started = []
         self.secured = rights is not None
         self.scheme = "tls" if self.secured else "tcp"
         self.exposed = self.hosts.insecure and not self.secured
-        if self.secured:
-            try:
+        self.files = None
+        try:
+            with DeferredSignals():
+                self.files = tempfile.TemporaryDirectory(prefix="cles-jadc2-")
+            self.folder = self.files.name
+            if self.secured:
                 self._create_keys(rights)
-            except BaseException:
-                self.close()
-                raise
+        except BaseException:
+            self.close()
+            raise
 
     def _create_keys(self, rights):
         def run(*words):
-            done = subprocess.run([self.program("cles"), *words], stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                                  timeout=PATIENCE, check=False, env=clean_environment())
+            with DeferredSignals():
+                done = subprocess.run([self.program("cles"), *words], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                      timeout=PATIENCE, check=False, env=clean_environment())
             if done.returncode != 0:
                 raise Trouble(f"cannot create the keys: {done.stderr.strip()}")
 
@@ -373,7 +376,8 @@ class Fleet:
         for process in reversed(self.started):
             process.close()
         self.hosts.close()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        if self.files is not None:
+            self.files.cleanup()
 
 
 def free_port():

@@ -12,7 +12,7 @@ import unittest
 from pathlib import Path
 
 SCRIPT, PROGRAMS = sys.argv[1], sys.argv[2]
-BOUND = 100  # seconds; it takes about two
+BOUND = 100  # seconds; each takes a few
 
 
 def members_of(session):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Runs the part of the demonstration that shows the case studies.
+"""Runs the part of the demonstration that shows the case studies: to its end, interrupted, and if it cannot work.
 
     demo_case_studies_test.py SCRIPT FOLDER
 
@@ -8,6 +8,7 @@ FOLDER is where the programs are.
 """
 
 import os
+import signal
 import sys
 import unittest
 
@@ -23,9 +24,15 @@ class Demo(DemoCase):
         for member in ("recon", "operator"):
             self.assertIn(f"cles: denied: {member} may not send DELEGATE 'strike' to strike1", said)
 
+    def test_interrupted_it_cleans_up(self):
+        for number, at in ((signal.SIGINT, "A platoon"), (signal.SIGTERM, "Joint command")):
+            code, said, complaint = self.show(interrupt=number, at=at)
+            self.assertEqual((code, complaint), (128 + number, ""), said)
+            self.assertNotIn("mission:", said)
+
     def test_a_platoon_that_fails_is_said(self):
         fake = self.folder / "cles-platoon"
-        fake.write_text("#!/bin/sh\necho no such luck >&2\nexit 1\n")
+        fake.write_text("#!/bin/sh\necho no such luck >&2\nexit 1\n", encoding="utf-8")
         fake.chmod(0o755)
         code, _, complaint = self.show(str(self.folder))
         self.assertEqual((code, complaint), (1, "cles: the platoon ended with 1: no such luck\n\n"))

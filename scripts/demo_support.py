@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: BSL-1.0
+"""Shared by the parts of the demonstration."""
+
+import os
+import sys
+
+BOLD, PLAIN = ("\033[1m", "\033[0m") if sys.stdout.isatty() and not os.environ.get("NO_COLOR") else ("", "")
+
+
+class Trouble(Exception):
+    """Something has not happened as it should."""
+
+
+def heading(text):
+    print(f"\n{BOLD}{text}{PLAIN}", flush=True)
