@@ -48,7 +48,7 @@ class meter {
 template <class Tap>
 asio::awaitable<void> measure(service& car, service& client, const Tap& tap, std::uint64_t exchanges,
                               packet_source packets, verb_bytes& out) {
-    // It waits for the link, and where that takes a millisecond, it says by how much its deadline is shorter.
+    // The first request waits for the link. If that takes a millisecond, it has a `deadline=`, which would count.
     co_await client.async_pull<localization>(noun);
 
     const meter pulls{tap};

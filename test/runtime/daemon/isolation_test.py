@@ -831,6 +831,7 @@ class Crowd(Isolated):
         self.assertLessEqual(set(codes), {None, "failed", "busy"})
         self.assertGreaterEqual(codes[None], 500)
         self.assertLessEqual(codes["failed"], 12)
+        wait_until(lambda: "error" not in body(self.daemon.ask("PULL self:quick")), "it serves again")
 
 
 if __name__ == "__main__":

@@ -29,12 +29,12 @@ class shrinking {
             return false;
         }
         --left_;
-        const bool is_broken =
+        const bool still_breaks =
             broken_ == rule::same_trace ? simulate_twice(p, fault_).broke(broken_) : simulate(p, fault_).broke(broken_);
-        if (is_broken) {
+        if (still_breaks) {
             best_ = p;
         }
-        return is_broken;
+        return still_breaks;
     }
 
     bool drop_actions() {
