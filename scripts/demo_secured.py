@@ -10,21 +10,14 @@ FOLDER contains the programs; default build/release/apps. No processes or files 
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
 import time
 
-from demo_support import Trouble, heading
+from demo_support import Trouble, free_port, heading
 
 PATIENCE = 20  # seconds; everything takes far less
-
-
-def free_port():
-    with socket.socket(type=socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Fleet:

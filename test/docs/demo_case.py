@@ -59,3 +59,18 @@ class DemoCase(unittest.TestCase):
         self.assertEqual(members_of(demo.pid), [], "processes that it left behind")
         self.assertEqual(list(files.iterdir()), [], "files that it left behind")
         return code, said, complaint
+
+    def check_interrupts(self, interrupts, later):
+        """`interrupts` are signals, and the words at which each is sent: it ends at once, without having said `later`."""
+        for number, at in interrupts:
+            code, said, complaint = self.show(interrupt=number, at=at)
+            self.assertEqual((code, complaint), (128 + number, ""), said)
+            self.assertNotIn(later, said)
+
+    def check_failure(self, program, complaint, first=""):
+        """A program that cannot work is reported. `first` is what it does before, in shell."""
+        fake = self.folder / program
+        fake.write_text(f"#!/bin/sh\n{first}echo no such luck >&2\nexit 1\n", encoding="utf-8")
+        fake.chmod(0o755)
+        code, _, said = self.show(str(self.folder))
+        self.assertEqual((code, said), (1, f"cles: {complaint}: no such luck\n\n"))

@@ -25,17 +25,10 @@ class Demo(DemoCase):
             self.assertIn(f"cles: denied: {member} may not send DELEGATE 'strike' to strike1", said)
 
     def test_interrupted_it_cleans_up(self):
-        for number, at in ((signal.SIGINT, "A platoon"), (signal.SIGTERM, "Joint command")):
-            code, said, complaint = self.show(interrupt=number, at=at)
-            self.assertEqual((code, complaint), (128 + number, ""), said)
-            self.assertNotIn("mission:", said)
+        self.check_interrupts(((signal.SIGINT, "A platoon"), (signal.SIGTERM, "Joint command")), "mission:")
 
     def test_a_platoon_that_fails_is_said(self):
-        fake = self.folder / "cles-platoon"
-        fake.write_text("#!/bin/sh\necho no such luck >&2\nexit 1\n", encoding="utf-8")
-        fake.chmod(0o755)
-        code, _, complaint = self.show(str(self.folder))
-        self.assertEqual((code, complaint), (1, "cles: the platoon ended with 1: no such luck\n\n"))
+        self.check_failure("cles-platoon", "the platoon ended with 1")
 
     def test_programs_that_are_missing_are_said(self):
         self.assertTrue(os.path.exists(os.path.join(PROGRAMS, "cles-platoon")))

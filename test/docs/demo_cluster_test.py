@@ -35,17 +35,10 @@ class Demo(DemoCase):
         self.assertRegex(said, r"(?m)^  60 done in \d+\.\d s\. Jobs that waited at car2 moved to its neighbours")
 
     def test_interrupted_it_cleans_up(self):
-        for number, at in ((signal.SIGINT, "sat1 listening"), (signal.SIGTERM, "sat1 is dead")):
-            code, said, complaint = self.show(interrupt=number, at=at)
-            self.assertEqual((code, complaint), (128 + number, ""), said)
-            self.assertNotIn("Which nodes reply", said)
+        self.check_interrupts(((signal.SIGINT, "sat1 listening"), (signal.SIGTERM, "sat1 is dead")), "Which nodes reply")
 
     def test_a_daemon_that_cannot_start_is_said(self):
-        fake = self.folder / "clesd"
-        fake.write_text("#!/bin/sh\necho no such luck >&2\nexit 1\n", encoding="utf-8")
-        fake.chmod(0o755)
-        code, _, complaint = self.show(str(self.folder))
-        self.assertEqual((code, complaint), (1, "cles: sat1 did not start: no such luck\n\n"))
+        self.check_failure("clesd", "sat1 did not start")
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@
 
 #include <boost/describe.hpp>
 
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>

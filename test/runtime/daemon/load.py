@@ -3,6 +3,7 @@
 
 import collections
 import json
+import math
 import select
 import socket
 import time
@@ -39,7 +40,7 @@ class Load:
     """A client that sends jobs at a steady pace, without waiting for their answers."""
 
     PACE = 0.005
-    LIMIT = 1000000  # jobs under way: a machine that does not keep up gets them more slowly
+    LIMIT = math.inf  # jobs under way: a machine that does not keep up gets them more slowly
     # The kinds of requests, in turn: most are for any node; the others name each node in turn.
     MIX = (("any", "once"), ("any", "again"), ("named", "once"), ("any", "once"), ("any", "fails"), ("any", "once"))
 
