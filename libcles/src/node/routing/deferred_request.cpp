@@ -242,7 +242,7 @@ bool scatter_gather::ask_known(time_point now) {
         }
     }
     add_pools();
-    if (parts_.empty() && routing_->expects_nodes()) {
+    if (parts_.empty() && (routing_->expects_more() || routing_->expects_nodes())) {
         return false;
     }
     begun_ = true;

@@ -248,11 +248,22 @@ void service_registry::ask(time_point now) {
 }
 
 void service_registry::wake_next(digest_group& of) {
+    expect_next(of);
     of.asked = nullptr;
     if (!of.waiting.empty()) {
         auto& next = *of.waiting.begin()->second;
         of.waiting.erase(of.waiting.begin());
         wait_for_turn(next);
+    }
+}
+
+// It has waited for the reply of another, and only now has its turn.
+void service_registry::expect_next(const digest_group& of) {
+    if (of.waiting.empty()) {
+        return;
+    }
+    if (auto& next = *of.waiting.begin()->second; !next.tasks && next.failures == 0) {
+        expect(next, node_.time.now() + answer_within);
     }
 }
 
@@ -318,7 +329,11 @@ void service_registry::follow() {
 void service_registry::on_deadline(time_point now) {
     const bool expected = expects_more();
     while (!expected_.empty() && expected_.begin()->first <= now) {
-        expect(*find(expected_.begin()->second), {});
+        auto& late = *find(expected_.begin()->second);
+        expect(late, {});
+        if (const auto* k = digest_group_of(late); k != nullptr && k->asked == &late) {
+            expect_next(*k); // the query of `late` fails at this moment
+        }
     }
     ask(now);
     if (expected && !expects_more()) {

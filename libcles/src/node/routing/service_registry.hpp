@@ -110,7 +110,8 @@ class service_registry final : private deadline {
 
     /// For the task `cles`: all nodes. Valid until the next change.
     [[nodiscard]] const std::vector<offer>& offers(verb v, std::string_view task) const;
-    /// Whether the tasks of nodes received within the last second may still become known at any moment.
+    /// Whether the tasks of nodes that were received, or had their turn to be asked, within the last second may still
+    /// become known at any moment.
     [[nodiscard]] bool expects_more() const noexcept { return !expected_.empty(); }
     /// Null if it is not known.
     [[nodiscard]] known_node* find(std::string_view name) noexcept;
@@ -142,6 +143,7 @@ class service_registry final : private deadline {
     void on_tasks(known_node& of, task_list list);
     void on_no_reply(known_node& of, bool unreachable, time_point now);
     void wake_next(digest_group& of);
+    void expect_next(const digest_group& of);
     void follow();
     void set_tasks(known_node& of, std::shared_ptr<const task_list> tasks);
     void forget_offers(const known_node& of);

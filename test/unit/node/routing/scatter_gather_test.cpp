@@ -196,4 +196,23 @@ BOOST_AUTO_TEST_CASE(nodes_with_unknown_tasks_are_waited_for_at_most_half_the_ti
     }
 }
 
+BOOST_AUTO_TEST_CASE(while_no_node_is_known_to_offer_the_task_it_waits_on) {
+    hear("car5", "same");
+    hear("car6", "same");
+    link.ask("PULL all:height id=9 deadline=5000");
+    node.pass(1000ms);
+    ways.to("car5").fails(errc::deadline, "no answer was received in time");
+    node.pass(999ms);
+    BOOST_TEST(link.take().empty());
+    ways.to("car6").answers(description("car6", task("PULL", "height")));
+    ways.to("car5").answers("5");
+    ways.to("car6").answers("6");
+    BOOST_TEST(link.take() == "id=9 {\"results\":{\"car5\":5,\"car6\":6},\"errors\":{}}\n");
+
+    hear("car7", "other");
+    link.ask("PULL all:depth id=10 deadline=5000");
+    node.pass(1000ms);
+    BOOST_TEST(link.take().starts_with("id=10 {\"error\":\"no_target\"")); // none is left that may offer it
+}
+
 BOOST_AUTO_TEST_SUITE_END()

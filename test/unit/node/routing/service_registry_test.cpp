@@ -95,6 +95,29 @@ BOOST_AUTO_TEST_CASE(if_one_node_of_a_digest_does_not_answer_another_is_asked) {
     BOOST_TEST(offered_by(verb::pull, "speed") == "car2 car3");
 }
 
+// Whichever comes first, the failure of the query or the end of the second.
+BOOST_AUTO_TEST_CASE(a_node_that_waits_for_another_of_its_digest_is_waited_for_when_its_turn_comes) {
+    for (const bool failure_is_first : {true, false}) {
+        const std::string digest = failure_is_first ? "one" : "another";
+        const std::string offered = digest + "_task";
+        const auto name = [&](int number) { return digest + std::to_string(number); };
+        for (int i = 1; i <= 3; ++i) {
+            hear(name(i), digest);
+        }
+        for (int i = 1; i <= 2; ++i) {
+            node.pass(failure_is_first ? 999ms : 1000ms);
+            BOOST_TEST(routing->expects_more());
+            ways.to(name(i)).fails(errc::deadline, "no answer was received in time");
+            BOOST_TEST(routing->expects_more());
+        }
+        node.pass(999ms);
+        BOOST_TEST(routing->expects_more());
+        ways.to(name(3)).answers(description(name(3), task("PULL", offered)));
+        BOOST_TEST(!routing->expects_more());
+        BOOST_TEST(offered_by(verb::pull, offered) == name(1) + " " + name(2) + " " + name(3));
+    }
+}
+
 BOOST_AUTO_TEST_CASE(nodes_without_a_digest_are_asked_separately) {
     hear("car2", "");
     hear("car3", "");
