@@ -57,22 +57,29 @@ class Stops(unittest.TestCase):
         self.assertEqual(self.count("ended_and_not_stopped"), 0)
         self.assertEqual(self.daemon.stop()[0], 0)
 
+    def told_after(self, link, label, blocking):
+        """How long it takes until 100 jobs are told which are withdrawn after those that block, in milliseconds."""
+        names = [f"{label}.{n}" for n in range(100)]
+        listening = self.begin(link, "listens", names)
+        withdrawn = time.monotonic_ns()
+        self.withdraw(link, blocking + listening)
+        wait_until(lambda: {each for each, _ in self.marks()} >= set(names), "all are told")
+        return (max(at for name, at in self.marks() if name in names) - withdrawn) / 1e6
+
     def test_a_blocking_callback_delays_no_other(self):
         with self.daemon.connect() as link:
-            blocking = self.begin(link, "blocks_when_stopped", [f"b{n}" for n in range(BLOCKERS)])
-            late = []
-            for attempt in range(3):  # other programs may use the machine
-                names = [f"told{attempt}.{n}" for n in range(100)]
-                listening = self.begin(link, "listens", names)
-                withdrawn = time.monotonic_ns()
-                self.withdraw(link, blocking + listening)
-                wait_until(lambda n=names: {each for each, _ in self.marks()} >= set(n), "all are told")
-                late.append(max(at for name, at in self.marks() if name in names) - withdrawn)
-                print(f"attempt {attempt + 1}: all are told {late[-1] / 1e6:.1f} ms after the first was withdrawn")
-                if late[-1] <= 50e6:
+            delays = []
+            blockers = [f"b{n}" for n in range(BLOCKERS)]
+            for attempt in range(6):  # other programs may use the machine
+                usual = self.told_after(link, f"usual{attempt}", [])
+                blocking = self.begin(link, "blocks_when_stopped", blockers)
+                late = self.told_after(link, f"late{attempt}", blocking)
+                print(f"attempt {attempt + 1}: all are told after {late:.1f} ms, without blocking after {usual:.1f} ms")
+                delays.append(late - usual)
+                if delays[-1] <= 50:
                     break
-                blocking = self.begin(link, "blocks_when_stopped", ["again"])
-            self.assertLessEqual(min(late), 50e6)
+                blockers = [f"again{attempt}"]
+            self.assertLessEqual(min(delays), 50)
         entry = self.daemon.wait_for_entry("on_stop callback does not return")
         self.assertEqual(entry["level"], "warning")
         self.assertIn("blocks_when_stopped", entry["message"])
