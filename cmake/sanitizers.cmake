@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: BSL-1.0
 
-# gold links programs with sanitizers in half the time. Not every system has it.
-if(CLES_SANITIZE)
-    include(CheckLinkerFlag)
-    check_linker_flag(CXX "-fuse-ld=gold" CLES_LINKER_GOLD)
-endif()
+# gold links the programs of the tests, and those with sanitizers, in half the time. Not every system has it.
+include(CheckLinkerFlag)
+check_linker_flag(CXX "-fuse-ld=gold" CLES_LINKER_GOLD)
 
 # cles_target_sanitizers(target): instruments the target as CLES_SANITIZE says. Nothing recovers: the first finding ends
 # the program, so that no test passes over one.
@@ -52,6 +50,10 @@ endfunction()
 # cles_target_tests_only(target): for test code. It omits the checks of each pointer, which take half the compile
 # time; the library's own code has them. Invalid reads and writes are detected in both.
 function(cles_target_tests_only target)
+    get_target_property(type ${target} TYPE)
+    if(CLES_LINKER_GOLD AND type STREQUAL "EXECUTABLE")
+        target_link_options(${target} PRIVATE -fuse-ld=gold)
+    endif()
     if("undefined" IN_LIST CLES_SANITIZE)
         target_compile_options(${target} PRIVATE -fno-sanitize=alignment,null,object-size,pointer-overflow,vptr)
     endif()
