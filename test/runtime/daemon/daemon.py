@@ -129,6 +129,8 @@ class Daemon(Folder):
         if self.process.poll() is None:
             self.process.kill()
         self.process.communicate()
+        if "Sanitizer" in self.log():
+            print(self.log())  # otherwise its report would be lost
         super().__exit__()
 
 
