@@ -18,8 +18,8 @@ from pathlib import Path
 
 # What the types in the interface of `service.hpp` need: containers and functions, executors, and coroutines.
 NEEDED = ("any", "functional", "map", "memory", "optional", "span", "string", "string_view", "unordered_map",
-          "vector", "boost/asio/any_io_executor.hpp", "boost/asio/use_awaitable.hpp")
-MOST_BEYOND = 0.0415  # of the lines that these have
+          "variant", "vector", "boost/asio/any_io_executor.hpp", "boost/asio/use_awaitable.hpp")
+MOST_BEYOND = 0.041  # of the lines that these have
 
 AWAITING = """
 #include <cles/service.hpp>

@@ -24,7 +24,6 @@ HEADER = """#include <cles/service.hpp>
 #include <boost/describe.hpp>
 #include <array>
 #include <memory>
-#include <variant>
 namespace asio = boost::asio;
 struct note { std::string text{}; };
 BOOST_DESCRIBE_STRUCT(note, (), (text))

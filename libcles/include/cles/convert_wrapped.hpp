@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <variant>
 
 /// Scalars are sent as {"value":x}, and unwrapped when read. Not for applications.
 
@@ -25,18 +26,16 @@ inline constexpr bool is_scalar =
 };
 template <class T>
 inline constexpr bool is_scalar<std::optional<T>> = is_scalar<T>;
-template <template <class...> class Variant, class... T>
-    requires variant<Variant<T...>>
-inline constexpr bool is_scalar<Variant<T...>> = (is_scalar<T> && ...);
+template <class... T>
+inline constexpr bool is_scalar<std::variant<T...>> = (is_scalar<T> && ...);
 
 /// Types that may be written as a scalar.
 template <class T>
 inline constexpr bool comes_wrapped = is_scalar<T>;
 template <class T>
 inline constexpr bool comes_wrapped<std::optional<T>> = true; // as null
-template <template <class...> class Variant, class... T>
-    requires variant<Variant<T...>>
-inline constexpr bool comes_wrapped<Variant<T...>> = (comes_wrapped<T> || ...);
+template <class... T>
+inline constexpr bool comes_wrapped<std::variant<T...>> = (comes_wrapped<T> || ...);
 
 } // namespace cles::detail
 

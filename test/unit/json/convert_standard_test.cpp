@@ -255,20 +255,6 @@ BOOST_AUTO_TEST_CASE(an_unordered_map_is_an_object) {
                 why<map>("{\"a\":[1,true]}").starts_with("a[1]: expected a number")));
 }
 
-// The headers recognise both without <variant>.
-BOOST_AUTO_TEST_CASE(only_variants_and_monostate_are_taken_for_them) {
-    struct empty {
-        auto operator<=>(const empty&) const = default;
-    };
-    using cles::detail::monostate;
-    using cles::detail::variant;
-    BOOST_TEST((monostate<std::monostate> && variant<std::variant<int>> && variant<std::variant<std::monostate>>));
-    BOOST_TEST(!(monostate<empty> || monostate<std::tuple<>> || monostate<std::true_type> || monostate<std::less<>>));
-    BOOST_TEST(!(variant<std::optional<int>> || variant<std::vector<int>> || variant<std::monostate>));
-    BOOST_TEST(cles::to_json(std::monostate{}) == "null");
-    BOOST_TEST(cles::to_json(std::tuple<>{}) == "[]");
-}
-
 BOOST_AUTO_TEST_CASE(a_variant_is_the_value_that_it_holds) {
     using either = std::variant<std::monostate, double, std::string, pose, std::vector<int>>;
     BOOST_TEST(to_json(either{}) == "null");
