@@ -241,8 +241,11 @@ bool scatter_gather::ask_known(time_point now) {
             }
         }
     }
+    if (parts_.empty() && r.hops != 0 && routing_->expects_more()) {
+        return false;
+    }
     add_pools();
-    if (parts_.empty() && (routing_->expects_more() || routing_->expects_nodes())) {
+    if (parts_.empty() && routing_->expects_nodes()) {
         return false;
     }
     begun_ = true;

@@ -80,6 +80,7 @@ void service_registry::stop() noexcept {
 void service_registry::on_member_seen(std::string_view name) {
     const auto now = node_.time.now();
     const auto heard = node_.peers.find_member(name);
+    const bool expected = expects_more();
     auto at = nodes_.find(name);
     if (!heard) {
         if (at != nodes_.end()) {
@@ -127,6 +128,9 @@ void service_registry::on_member_seen(std::string_view name) {
         return;
     }
     ask(now);
+    if (expected && !expects_more()) {
+        on_offers_();
+    }
 }
 
 const known_node* service_registry::find(std::string_view name) const noexcept {
@@ -213,7 +217,7 @@ void service_registry::give_up(known_node& n) {
         n.ticket = 0;
     }
     if (auto* k = digest_group_of(n)) {
-        k->waiting.erase(n.name);
+        k->waiting.erase({n.failures, n.name});
         if (k->asked == &n) {
             wake_next(*k);
         }
@@ -227,7 +231,7 @@ void service_registry::ask(time_point now) {
         auto* k = digest_group_of(n);
         if (k != nullptr && k->asked != nullptr) {
             queries_.remove(n);
-            k->waiting.emplace(n.name, &n);
+            k->waiting.emplace(std::pair{n.failures, std::string_view{n.name}}, &n);
             continue;
         }
         if (k != nullptr) {
@@ -257,7 +261,7 @@ void service_registry::wake_next(digest_group& of) {
     }
 }
 
-// It has waited for the reply of another, and only now has its turn.
+// The next one to be asked has waited for the replies of others, and is waited for from now on.
 void service_registry::expect_next(const digest_group& of) {
     if (of.waiting.empty()) {
         return;
@@ -331,8 +335,8 @@ void service_registry::on_deadline(time_point now) {
     while (!expected_.empty() && expected_.begin()->first <= now) {
         auto& late = *find(expected_.begin()->second);
         expect(late, {});
-        if (const auto* k = digest_group_of(late); k != nullptr && k->asked == &late) {
-            expect_next(*k); // the query of `late` fails at this moment
+        if (const auto* k = digest_group_of(late); k != nullptr && k->asked != nullptr) {
+            expect_next(*k); // the query that it waits for ends within a second, perhaps at this moment
         }
     }
     ask(now);

@@ -110,8 +110,8 @@ class service_registry final : private deadline {
 
     /// For the task `cles`: all nodes. Valid until the next change.
     [[nodiscard]] const std::vector<offer>& offers(verb v, std::string_view task) const;
-    /// Whether the tasks of nodes that were received, or had their turn to be asked, within the last second may still
-    /// become known at any moment.
+    /// Whether the tasks of further nodes may become known at any moment. A node is waited for from when it is first
+    /// received, and from its turn after other nodes of its digest; each time for a second.
     [[nodiscard]] bool expects_more() const noexcept { return !expected_.empty(); }
     /// Null if it is not known.
     [[nodiscard]] known_node* find(std::string_view name) noexcept;
@@ -127,7 +127,8 @@ class service_registry final : private deadline {
         std::map<std::string_view, known_node*> nodes{}; // by name
         std::shared_ptr<const task_list> tasks{};        // null: not known
         const known_node* asked = nullptr;               // the others wait for its reply
-        std::map<std::string_view, known_node*> waiting{};
+        /// By the number of failures and the name: a node that failed does not overtake one that was never asked.
+        std::map<std::pair<unsigned, std::string_view>, known_node*> waiting{};
     };
 
     void on_member_seen(std::string_view name);

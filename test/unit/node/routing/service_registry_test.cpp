@@ -118,6 +118,26 @@ BOOST_AUTO_TEST_CASE(a_node_that_waits_for_another_of_its_digest_is_waited_for_w
     }
 }
 
+// Those that did not answer are asked again after two seconds, but do not overtake.
+BOOST_AUTO_TEST_CASE(a_live_node_is_waited_for_behind_many_silent_ones_of_its_digest) {
+    for (int i = 1; i <= 9; ++i) {
+        hear_at("n" + std::to_string(i), "tcp://127.0.0.1:" + std::to_string(i), "same");
+    }
+    for (int silent = 0; offered_by(verb::pull, "speed").empty(); ++silent) {
+        BOOST_REQUIRE_LT(silent, 20);
+        node.pass(999ms);
+        BOOST_REQUIRE(routing->expects_more());
+        if (ways.open().text == "PULL n9:cles") {
+            ways.open().answers(description("n9", task("PULL", "speed")));
+        } else {
+            node.pass(1ms);
+            BOOST_REQUIRE(routing->expects_more());
+            ways.open().fails(errc::deadline, "no answer was received in time");
+        }
+    }
+    BOOST_TEST(!routing->expects_more());
+}
+
 BOOST_AUTO_TEST_CASE(nodes_without_a_digest_are_asked_separately) {
     hear("car2", "");
     hear("car3", "");
