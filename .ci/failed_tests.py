@@ -3,7 +3,7 @@
 """Says which failed tests are worth another attempt: each one alone, because on a busy machine tests disturb each other.
 
     failed_tests.py RESULTS    reads what ctest wrote as JUnit XML; prints a pattern for `ctest -R`, or nothing: if more than
-                               three tests failed, or one of them shows what a sanitizer reports, which is never chance
+                               three tests failed, or one of them crashed or shows a sanitizer's report, which is never chance
     failed_tests.py --self-test
 """
 
@@ -14,12 +14,18 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 MOST = 3
-REPORT = re.compile(r"Sanitizer|runtime error:")
+CRASH = re.compile(r"Sanitizer|runtime error:|memory access violation|signal: |terminate called|Assertion")
+
+
+def crashed(case: ElementTree.Element) -> bool:
+    failure = case.find("failure")
+    ended = failure.get("message", "") if failure is not None else ""
+    return ended not in ("", "Failed", "Timeout") or bool(CRASH.search(case.findtext("system-out") or ""))
 
 
 def worth_another_attempt(results: Path) -> str:
     failed = [case for case in ElementTree.parse(results).iter("testcase") if case.get("status") == "fail"]
-    if not 0 < len(failed) <= MOST or any(REPORT.search(case.findtext("system-out") or "") for case in failed):
+    if not 0 < len(failed) <= MOST or any(crashed(case) for case in failed):
         return ""
     return "^(" + "|".join(re.escape(case.get("name", "")) for case in failed) + ")$"
 
@@ -33,6 +39,8 @@ CASES = {
         r"^(c\.d)$",
     '<testcase name="a" status="fail"/><testcase name="b" status="fail"/>': "^(a|b)$",
     '<testcase name="a" status="fail"/>' * 4: "",
+    '<testcase name="a" status="fail"><failure message="Failed"/></testcase>': "^(a)$",
+    '<testcase name="a" status="fail"><failure message="SEGFAULT"/></testcase>': "",
     '<testcase name="a" status="fail"><system-out>WARNING: ThreadSanitizer: data race</system-out></testcase>': "",
     '<testcase name="a" status="fail"/>'
     '<testcase name="b" status="fail"><system-out>x.cpp:1:2: runtime error: overflow</system-out></testcase>': "",

@@ -99,3 +99,5 @@ class Node:
     def __exit__(self, *_):
         self.process.send_signal(signal.SIGTERM)
         finish(self.process)
+        if any("Sanitizer" in message for message in self.messages()):
+            print(*self.messages(), sep="\n")  # otherwise its report would be lost
