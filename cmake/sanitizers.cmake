@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: BSL-1.0
 
 # gold links the programs of the tests, and those with sanitizers, in half the time. Not every system has it.
-include(CheckLinkerFlag)
-check_linker_flag(CXX "-fuse-ld=gold" CLES_LINKER_GOLD)
+if(CLES_SANITIZE OR CLES_BUILD_TESTS)
+    include(CheckLinkerFlag)
+    check_linker_flag(CXX "-fuse-ld=gold" CLES_LINKER_GOLD)
+endif()
 
 # cles_target_sanitizers(target): instruments the target as CLES_SANITIZE says. Nothing recovers: the first finding ends
 # the program, so that no test passes over one.

@@ -67,6 +67,14 @@ class Folder:
         shutil.rmtree(self.path)
 
 
+def show_report(path):
+    """Prints a log that contains a sanitizer's report, which would be lost with the file."""
+    with open(path, encoding="utf-8") as log:
+        text = log.read()
+    if "Sanitizer" in text:
+        print(text)
+
+
 class Daemon(Folder):
     """A running clesd. Its log, JSON on stderr, is kept in a file."""
 
@@ -129,8 +137,7 @@ class Daemon(Folder):
         if self.process.poll() is None:
             self.process.kill()
         self.process.communicate()
-        if "Sanitizer" in self.log():
-            print(self.log())  # otherwise its report would be lost
+        show_report(self.file("log"))
         super().__exit__()
 
 

@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 
-from daemon import CLESD, Folder, clean_environment
+from daemon import CLESD, Folder, clean_environment, show_report
 from support import CLES, PATIENCE, finish, free_port, read_line, wait_until
 
 
@@ -99,5 +99,4 @@ class Node:
     def __exit__(self, *_):
         self.process.send_signal(signal.SIGTERM)
         finish(self.process)
-        if any("Sanitizer" in message for message in self.messages()):
-            print(*self.messages(), sep="\n")  # otherwise its report would be lost
+        show_report(self.log_file)
