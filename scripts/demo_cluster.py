@@ -73,6 +73,21 @@ def patient(question, what):
     return answer
 
 
+def has_ended(process, seconds):
+    """Waits that long for its end. `Popen.wait` would wait for ever: an interrupt during an earlier call may leave its lock
+    held."""
+    until = time.monotonic() + seconds
+    while True:
+        try:
+            if os.waitpid(process.pid, os.WNOHANG)[0] == process.pid:
+                return True
+        except ChildProcessError:  # it has been waited for
+            return True
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+
+
 class Link:
     """A client with one socket, which sends and receives lines."""
 
@@ -183,11 +198,9 @@ class Cluster:
         for process in self.started:
             process.terminate()
         for process in self.started:
-            try:
-                process.wait(3)
-            except subprocess.TimeoutExpired:
+            if not has_ended(process, 3):
                 process.kill()
-                process.wait()
+                has_ended(process, PATIENCE)
             process.stdout.close()
         self.started.clear()
 

@@ -11,9 +11,14 @@ FOLDER is where `clesd` and `cles` are.
 import re
 import signal
 import sys
+import threading
 import unittest
+from pathlib import Path
 
-from demo_case import DemoCase
+from demo_case import SCRIPT, DemoCase
+
+sys.path.insert(0, str(Path(SCRIPT).parent))
+import demo_cluster  # noqa: E402
 
 
 class Demo(DemoCase):
@@ -36,6 +41,18 @@ class Demo(DemoCase):
 
     def test_interrupted_it_cleans_up(self):
         self.check_interrupts(((signal.SIGINT, "sat1 listening"), (signal.SIGTERM, "sat1 is dead")), "Which nodes reply")
+
+    def test_it_ends_what_an_interrupted_wait_has_left(self):
+        cluster = demo_cluster.Cluster("/bin")
+        killed, running = cluster.begin("sleep", "60"), cluster.begin("sleep", "60")
+        killed.kill()
+        killed._waitpid_lock.acquire()  # an exception of a signal's handler may leave it held
+        closing = threading.Thread(target=cluster.close, daemon=True)
+        closing.start()
+        closing.join(20)
+        self.assertFalse(closing.is_alive())
+        self.assertIsNotNone(running.poll())
+        self.assertFalse(Path(cluster.folder).exists())
 
     def test_a_daemon_that_cannot_start_is_said(self):
         self.check_failure("clesd", "sat1 did not start")
