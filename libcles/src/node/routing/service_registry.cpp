@@ -80,7 +80,6 @@ void service_registry::stop() noexcept {
 void service_registry::on_member_seen(std::string_view name) {
     const auto now = node_.time.now();
     const auto heard = node_.peers.find_member(name);
-    const bool expected = expects_more();
     auto at = nodes_.find(name);
     if (!heard) {
         if (at != nodes_.end()) {
@@ -128,9 +127,6 @@ void service_registry::on_member_seen(std::string_view name) {
         return;
     }
     ask(now);
-    if (expected && !expects_more()) {
-        on_offers_();
-    }
 }
 
 const known_node* service_registry::find(std::string_view name) const noexcept {
@@ -160,7 +156,6 @@ void service_registry::restart_discovery(known_node& of, std::string_view digest
         k.nodes.emplace(of.name, &of);
         if (k.tasks) {
             set_tasks(of, k.tasks);
-            on_offers_();
             return;
         }
     }
@@ -182,12 +177,8 @@ void service_registry::leave_digest_group(known_node& n) {
 }
 
 void service_registry::forget(known_node& n, time_point now) {
-    const bool last_expected = n.expected_until && expected_.size() == 1;
     leave_digest_group(n);
     forget_offers(n);
-    if (n.tasks || last_expected) {
-        on_offers_();
-    }
     ask(now);
 }
 
@@ -218,7 +209,7 @@ void service_registry::give_up(known_node& n) {
     }
     if (auto* k = digest_group_of(n)) {
         k->waiting.erase({n.failures, n.name});
-        if (k->asked == &n) {
+        if (k->asked == &n || k->asked == nullptr) { // or it may be the one that was woken
             wake_next(*k);
         }
     }
@@ -278,7 +269,6 @@ void service_registry::on_reply(const std::string& name, std::uint64_t ticket, s
         return;
     }
     const auto now = node_.time.now();
-    const bool expected = expects_more();
     auto list = why == nullptr ? read_task_list(said, name) : std::nullopt;
     if (list) {
         on_tasks(*known, std::move(*list));
@@ -286,9 +276,6 @@ void service_registry::on_reply(const std::string& name, std::uint64_t ticket, s
         on_no_reply(*known, why != nullptr && why->unreachable, now);
     }
     ask(now);
-    if (list || (expected && !expects_more())) {
-        on_offers_();
-    }
 }
 
 void service_registry::on_tasks(known_node& of, task_list list) {
@@ -328,10 +315,13 @@ void service_registry::follow() {
     } else {
         node_.deadlines.disarm(*this);
     }
+    const bool ended = std::exchange(expected_more_, expects_more()) && !expected_more_;
+    if (std::exchange(offers_changed_, false) || ended) {
+        on_offers_();
+    }
 }
 
 void service_registry::on_deadline(time_point now) {
-    const bool expected = expects_more();
     while (!expected_.empty() && expected_.begin()->first <= now) {
         auto& late = *find(expected_.begin()->second);
         expect(late, {});
@@ -340,9 +330,6 @@ void service_registry::on_deadline(time_point now) {
         }
     }
     ask(now);
-    if (expected && !expects_more()) {
-        on_offers_();
-    }
 }
 
 // -- offers --------------------------------------------------------------------------------------------------------
@@ -369,6 +356,7 @@ void service_registry::set_tasks(known_node& of, std::shared_ptr<const task_list
     }
     of.tasks = std::move(tasks);
     offer_all(of);
+    offers_changed_ = true;
 }
 
 void service_registry::offer_all(const known_node& of) {
@@ -387,6 +375,7 @@ void service_registry::forget_offers(const known_node& of) {
     if (!of.tasks) {
         return;
     }
+    offers_changed_ = true;
     for (const auto& e : of.tasks->entries) {
         const auto found = offers_.find(e.task);
         if (found == offers_.end()) {

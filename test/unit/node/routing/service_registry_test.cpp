@@ -138,6 +138,29 @@ BOOST_AUTO_TEST_CASE(a_live_node_is_waited_for_behind_many_silent_ones_of_its_di
     BOOST_TEST(!routing->expects_more());
 }
 
+BOOST_AUTO_TEST_CASE(a_node_is_asked_if_the_one_before_it_of_its_digest_has_left_before_its_turn) {
+    int failed = 0;
+    do { // as many failures as are allowed at once: then queries have to wait for their turn
+        hear_at("n" + std::to_string(failed), "tcp://127.0.0.1:" + std::to_string(100 + failed), "");
+        fail_all();
+        BOOST_REQUIRE_LT(++failed, 100);
+    } while (ways.count() == static_cast<std::size_t>(failed));
+    leave("n" + std::to_string(failed - 1));
+    for (int i = 1; i <= 3; ++i) {
+        hear_at("same" + std::to_string(i), "tcp://127.0.0.1:" + std::to_string(i), "same");
+    }
+    node.pass(50ms);
+    const auto first = ways.open().node;
+    ways.open().fails(errc::deadline, "no answer was received in time");
+    BOOST_TEST(ways.count_open() == 0U);
+    const std::string second = first == "same1" ? "same2" : "same1";
+    const std::string third = first == "same3" ? "same2" : "same3";
+    leave(second);
+    node.pass(500ms);
+    BOOST_TEST(ways.count_open() == 1U);
+    BOOST_TEST(ways.to(third).text == "PULL " + third + ":cles");
+}
+
 BOOST_AUTO_TEST_CASE(nodes_without_a_digest_are_asked_separately) {
     hear("car2", "");
     hear("car3", "");
