@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 
+from demo_cluster import has_ended
 from demo_support import free_port, heading
 from jadc2_fleet import PATIENCE, RIGHTS, DeferredSignals, Fleet, Trouble, clean_environment
 
@@ -24,9 +25,9 @@ def drive(programs):
     alone = {**clean_environment(), "CLES_MULTICAST": f"lo,239.255.25.37:{free_port()}"}
     with contextlib.ExitStack() as ends:
         with DeferredSignals():
-            platoon = ends.enter_context(subprocess.Popen(
-                [os.path.join(programs, words[0]), *words[1:]], env=alone, stdin=subprocess.DEVNULL,
-                stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True))
+            platoon = subprocess.Popen([os.path.join(programs, words[0]), *words[1:]], env=alone, text=True,
+                                       stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            ends.callback(has_ended, platoon, PATIENCE)
             ends.callback(platoon.terminate)  # it ends its vehicles
         said, errors = platoon.communicate(timeout=PATIENCE)
     if platoon.returncode != 0:
