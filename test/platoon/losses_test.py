@@ -50,6 +50,17 @@ class Killed(DriveTest):
         watcher.wait()
         wait_until(lambda: not any(map(is_running, vehicles)), "its vehicles end")
 
+    def test_the_watcher_is_killed_while_its_vehicles_start(self):
+        """Before a vehicle runs its own program, it has the watcher's handlers of signals."""
+        for _ in range(20):
+            watcher = start("run", "--multicast", free_group(), "--vehicles", 3, "--seconds", 60)
+            vehicles = []
+            while len(vehicles) < 3 and watcher.poll() is None:
+                vehicles = children_of(watcher.pid)
+            watcher.kill()
+            watcher.communicate()
+            wait_until(lambda those=vehicles: not any(map(is_running, those)), "its vehicles end")
+
     def test_interrupted_it_ends_well(self):
         watcher = start("run", "--multicast", free_group(), "--vehicles", 2, "--seconds", 60, start_new_session=True)
         self.addCleanup(ended, watcher)

@@ -20,6 +20,7 @@ namespace {
 
 // Between fork and exec: nothing but system calls.
 [[noreturn]] void exec_child(std::vector<char*>& words, int out, int err, pid_t parent) {
+    ::signal(SIGTERM, SIG_DFL); // the parent's handler would only note it here
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) {
         ::_exit(127); // the parent has ended meanwhile
