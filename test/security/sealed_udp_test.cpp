@@ -11,6 +11,7 @@
 #include <boost/asio/ip/udp.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -320,13 +321,16 @@ BOOST_AUTO_TEST_CASE(leases_are_renewed) {
     car1->update("pose", 0);
     pose.bind(*car2, "car1:pose");
     until([&] { return pose.values.size() == 1; });
-    const auto begun = std::chrono::steady_clock::now();
+    using clock = std::chrono::steady_clock;
+    const auto begun = clock::now();
+    auto longest = clock::duration::zero(); // from one update to the next; on a busy machine, longer than a lease
     int value = 0;
-    while (std::chrono::steady_clock::now() - begun < 400ms) {
+    for (auto last = begun; last - begun < 400ms;) {
         car1->update("pose", ++value);
         until([&] { return pose.values.back() == value; });
+        longest = std::max(longest, clock::now() - std::exchange(last, clock::now()));
     }
-    BOOST_TEST(pose.lost == 0);
+    BOOST_TEST((pose.lost == 0 || longest > lease / 4), pose.lost << " times lost");
     BOOST_TEST(counted(*car2, "requests_sent") > 5U);
     pose.feed.close();
 }
