@@ -36,7 +36,7 @@ void query_scheduler::wait(query_target& who, time_point turn) {
     schedule(e);
 }
 
-void query_scheduler::remove(query_target& who) {
+bool query_scheduler::remove(query_target& who) {
     const auto was = std::exchange(who.at_, query_target::place::nowhere);
     if (was == query_target::place::fresh) {
         fresh_.erase(who.order_);
@@ -48,6 +48,12 @@ void query_scheduler::remove(query_target& who) {
         --at(who).asking;
         release(who);
     }
+    return was != query_target::place::nowhere;
+}
+
+bool query_scheduler::is_failing(const query_target& who) const {
+    const auto found = endpoints_.find(who.where);
+    return found != endpoints_.end() && found->second.failures != 0;
 }
 
 query_target* query_scheduler::next(time_point now) {

@@ -46,14 +46,16 @@ class query_scheduler {
 
     /// Queues `who`, unless it is queued already. Remove it before destroying it.
     void enter(query_target& who);
-    /// Removes it from the queue; it no longer counts as asked.
-    void remove(query_target& who);
+    /// Removes it from the queue; it no longer counts as asked. False if it was neither.
+    bool remove(query_target& who);
     /// The node to ask now, which counts as asked from then on; null if there is none.
     query_target* next(time_point now);
     /// It has replied, and leaves the queue.
     void answered(query_target& who);
     /// It has not replied, and waits for another turn. `unreachable`: no query gets through to its URL.
     void failed(query_target& who, bool unreachable, time_point now);
+    /// Whether the last query to its URL did not get through, so that it may have to wait for long.
+    [[nodiscard]] bool is_failing(const query_target& who) const;
     /// When `next` may return a node; nothing if that depends on other events.
     [[nodiscard]] std::optional<time_point> due() const noexcept;
 

@@ -156,6 +156,7 @@ void service_registry::restart_discovery(known_node& of, std::string_view digest
         k.nodes.emplace(of.name, &of);
         if (k.tasks) {
             set_tasks(of, k.tasks);
+            offers_changed_ = true; // if it was suspect, it may be used again
             return;
         }
     }
@@ -202,14 +203,14 @@ void service_registry::wait_for_turn(known_node& n) {
 
 // It is neither queried nor waits to be.
 void service_registry::give_up(known_node& n) {
-    queries_.remove(n);
+    const bool queued = queries_.remove(n);
     if (n.state == known_node::task_knowledge::asked) {
         n.state = known_node::task_knowledge::unknown;
         n.ticket = 0;
     }
     if (auto* k = digest_group_of(n)) {
         k->waiting.erase({n.failures, n.name});
-        if (k->asked == &n || k->asked == nullptr) { // or it may be the one that was woken
+        if (k->asked == &n || (k->asked == nullptr && queued)) { // the others wait for its reply or its turn
             wake_next(*k);
         }
     }
@@ -243,12 +244,14 @@ void service_registry::ask(time_point now) {
 }
 
 void service_registry::wake_next(digest_group& of) {
-    expect_next(of);
     of.asked = nullptr;
-    if (!of.waiting.empty()) {
+    bool later = true; // at a URL that fails, its turn may be minutes away: the others do not wait for it
+    while (later && !of.waiting.empty()) {
+        expect_next(of);
         auto& next = *of.waiting.begin()->second;
         of.waiting.erase(of.waiting.begin());
         wait_for_turn(next);
+        later = queries_.is_failing(next);
     }
 }
 
@@ -315,8 +318,8 @@ void service_registry::follow() {
     } else {
         node_.deadlines.disarm(*this);
     }
-    const bool ended = std::exchange(expected_more_, expects_more()) && !expected_more_;
-    if (std::exchange(offers_changed_, false) || ended) {
+    const bool expected = std::exchange(expected_more_, expects_more());
+    if (std::exchange(offers_changed_, false) || (expected && !expected_more_)) {
         on_offers_();
     }
 }

@@ -161,9 +161,8 @@ class service_registry final : private deadline {
     std::map<std::string, digest_group, std::less<>> digest_groups_; // by digest
     query_scheduler queries_;
     std::set<std::pair<time_point, std::string_view>> expected_; // until when, and the name
-    // Since `on_offers_` was last called:
-    bool expected_more_ = false; // something was expected
-    bool offers_changed_ = false;
+    bool expected_more_ = false;                                 // when `follow` was last called
+    bool offers_changed_ = false;                                // since `on_offers_` was last called
     std::uint64_t last_ticket_ = 0;
     std::shared_ptr<service_registry*> alive_; // for replies that arrive after its destruction
 };

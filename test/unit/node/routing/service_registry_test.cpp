@@ -155,10 +155,21 @@ BOOST_AUTO_TEST_CASE(a_node_is_asked_if_the_one_before_it_of_its_digest_has_left
     BOOST_TEST(ways.count_open() == 0U);
     const std::string second = first == "same1" ? "same2" : "same1";
     const std::string third = first == "same3" ? "same2" : "same3";
-    leave(second);
+    leave(second); // it would be asked next
     node.pass(500ms);
     BOOST_TEST(ways.count_open() == 1U);
     BOOST_TEST(ways.to(third).text == "PULL " + third + ":cles");
+}
+
+BOOST_AUTO_TEST_CASE(nodes_at_a_closed_port_do_not_delay_another_of_their_digest) {
+    for (int i = 1; i <= 5; ++i) {
+        hear_at("dead" + std::to_string(i), "tcp://127.0.0.1:9", "same");
+    }
+    hear_at("live", "tcp://127.0.0.1:1", "same");
+    ways.to("dead1").fails(boost::system::errc::make_error_code(boost::system::errc::connection_refused), "refused");
+    BOOST_TEST(ways.open().text == "PULL live:cles");
+    ways.open().answers(description("live", task("PULL", "speed")));
+    BOOST_TEST(!routing->expects_more());
 }
 
 BOOST_AUTO_TEST_CASE(nodes_without_a_digest_are_asked_separately) {
