@@ -73,9 +73,9 @@ def patient(question, what):
     return answer
 
 
-def has_ended(process, seconds):
-    """Waits that long for its end. `Popen.wait` would wait for ever: an interrupt during an earlier call may leave its lock
-    held."""
+def wait_for_end(process, seconds):
+    """Whether it ends within that time. `Popen.wait` would wait for ever: an interrupt during an earlier call may leave its
+    lock held."""
     until = time.monotonic() + seconds
     while True:
         try:
@@ -198,9 +198,9 @@ class Cluster:
         for process in self.started:
             process.terminate()
         for process in self.started:
-            if not has_ended(process, 3):
+            if not wait_for_end(process, 3):
                 process.kill()
-                has_ended(process, PATIENCE)
+                wait_for_end(process, PATIENCE)
             process.stdout.close()
         self.started.clear()
 
