@@ -54,7 +54,7 @@ class query_scheduler {
     void answered(query_target& who);
     /// It has not replied, and waits for another turn. `unreachable`: no query gets through to its URL.
     void failed(query_target& who, bool unreachable, time_point now);
-    /// Whether the last query to its URL did not get through, so that it may have to wait for long.
+    /// Whether its URL could not be reached, and nothing has been answered there since: it may have to wait for long.
     [[nodiscard]] bool is_failing(const query_target& who) const;
     /// When `next` may return a node; nothing if that depends on other events.
     [[nodiscard]] std::optional<time_point> due() const noexcept;

@@ -245,13 +245,18 @@ void service_registry::ask(time_point now) {
 
 void service_registry::wake_next(digest_group& of) {
     of.asked = nullptr;
-    bool later = true; // at a URL that fails, its turn may be minutes away: the others do not wait for it
-    while (later && !of.waiting.empty()) {
-        expect_next(of);
+    while (!of.waiting.empty()) {
         auto& next = *of.waiting.begin()->second;
+        const bool failing = queries_.is_failing(next);
+        if (!failing) {
+            expect_next(of);
+        }
         of.waiting.erase(of.waiting.begin());
         wait_for_turn(next);
-        later = queries_.is_failing(next);
+        if (!failing) {
+            return;
+        }
+        // Its turn may be a minute away: the others do not wait for it.
     }
 }
 
