@@ -51,12 +51,13 @@ class Killed(DriveTest):
         wait_until(lambda: not any(map(is_running, vehicles)), "its vehicles end")
 
     def test_the_watcher_is_killed_while_its_vehicles_start(self):
-        """Before a vehicle runs its own program, it has the watcher's handlers of signals."""
+        """Until it runs its own program, a vehicle has the watcher's handlers of signals. SIGTERM ends it all the same."""
         for _ in range(20):
             watcher = start("run", "--multicast", free_group(), "--vehicles", 3, "--seconds", 60)
             vehicles = []
             while len(vehicles) < 3 and watcher.poll() is None:
                 vehicles = children_of(watcher.pid)
+            self.assertEqual(len(vehicles), 3)
             watcher.kill()
             watcher.communicate()
             wait_until(lambda those=vehicles: not any(map(is_running, those)), "its vehicles end")

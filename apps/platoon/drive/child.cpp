@@ -19,8 +19,9 @@ namespace {
 [[noreturn]] void fail(const char* what) { throw std::system_error(errno, std::generic_category(), what); }
 
 // Between fork and exec: nothing but system calls.
-[[noreturn]] void exec_child(std::vector<char*>& words, int out, int err, pid_t parent) {
-    ::signal(SIGTERM, SIG_DFL); // the parent's handler would only note it here
+[[noreturn]] void exec_child(std::vector<char*>& words, int out, int err, pid_t parent, const sigset_t& unblocked) {
+    ::signal(SIGTERM, SIG_DFL);
+    ::pthread_sigmask(SIG_SETMASK, &unblocked, nullptr);
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) {
         ::_exit(127); // the parent has ended meanwhile
@@ -51,12 +52,19 @@ child::child(const std::vector<std::string>& arguments) {
     }
     words.push_back(nullptr);
     const pid_t parent = ::getpid();
+    // The child has this process's handlers until it runs its own program. They would note there that this one is to
+    // end.
+    sigset_t terminate{};
+    sigset_t unblocked{};
+    ::sigaddset(&terminate, SIGTERM);
+    ::pthread_sigmask(SIG_BLOCK, &terminate, &unblocked);
     pid_ = ::fork();
+    if (pid_ == 0) {
+        exec_child(words, out_, err_, parent, unblocked);
+    }
+    ::pthread_sigmask(SIG_SETMASK, &unblocked, nullptr);
     if (pid_ < 0) {
         fail("a vehicle's process");
-    }
-    if (pid_ == 0) {
-        exec_child(words, out_, err_, parent);
     }
 }
 
