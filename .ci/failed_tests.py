@@ -14,7 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 MOST = 3
-CRASH = re.compile(r"Sanitizer|runtime error:|memory access violation|signal: |terminate called|Assertion `")
+CRASH = re.compile(r"Sanitizer|runtime error:|memory access violation|signal: |terminate called|Assertion [`']")
 
 
 def crashed(case: ElementTree.Element) -> bool:
@@ -44,6 +44,7 @@ CASES = {
     '<testcase name="a" status="fail"><system-out>WARNING: ThreadSanitizer: data race</system-out></testcase>': "",
     '<testcase name="a" status="fail"><system-out>AssertionError: 1 != 2</system-out></testcase>': "^(a)$",
     '<testcase name="a" status="fail"><system-out>clesd: x.cpp:1: f: Assertion `x\' failed.</system-out></testcase>': "",
+    "<testcase name='a' status='fail'><system-out>Assertion '__n &lt; size()' failed.</system-out></testcase>": "",
     '<testcase name="a" status="fail"/>'
     '<testcase name="b" status="fail"><system-out>x.cpp:1:2: runtime error: overflow</system-out></testcase>': "",
 }

@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 
-from demo_cluster import wait_for_end
+from demo_cluster import end
 from demo_support import free_port, heading
 from jadc2_fleet import PATIENCE, RIGHTS, DeferredSignals, Fleet, Trouble, clean_environment
 
@@ -27,9 +27,9 @@ def drive(programs):
         with DeferredSignals():
             platoon = subprocess.Popen([os.path.join(programs, words[0]), *words[1:]], env=alone, text=True,
                                        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-            ends.callback(lambda: wait_for_end(platoon, PATIENCE) or platoon.kill())
             ends.callback(platoon.stderr.close)
             ends.callback(platoon.stdout.close)
+            ends.callback(end, platoon, PATIENCE)
             ends.callback(platoon.terminate)  # it ends its vehicles
         said, errors = platoon.communicate(timeout=PATIENCE)
     if platoon.returncode != 0:

@@ -88,6 +88,13 @@ def wait_for_end(process, seconds):
         time.sleep(0.01)
 
 
+def end(process, seconds):
+    """Waits that long for its end, and then kills it."""
+    if not wait_for_end(process, seconds):
+        process.kill()
+        wait_for_end(process, PATIENCE)
+
+
 class Link:
     """A client with one socket, which sends and receives lines."""
 
@@ -198,9 +205,7 @@ class Cluster:
         for process in self.started:
             process.terminate()
         for process in self.started:
-            if not wait_for_end(process, 3):
-                process.kill()
-                wait_for_end(process, PATIENCE)
+            end(process, 3)
             process.stdout.close()
         self.started.clear()
 

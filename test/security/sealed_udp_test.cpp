@@ -11,7 +11,6 @@
 #include <boost/asio/ip/udp.hpp>
 #include <boost/test/unit_test.hpp>
 
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -321,16 +320,17 @@ BOOST_AUTO_TEST_CASE(leases_are_renewed) {
     car1->update("pose", 0);
     pose.bind(*car2, "car1:pose");
     until([&] { return pose.values.size() == 1; });
-    using clock = std::chrono::steady_clock;
-    const auto begun = clock::now();
-    auto longest = clock::duration::zero(); // from one update to the next; on a busy machine, longer than a lease
+    const auto begun = std::chrono::steady_clock::now();
+    int pauses = 0; // of this process, on a busy machine: after each, a lease may be over
     int value = 0;
     for (auto last = begun; last - begun < 400ms;) {
         car1->update("pose", ++value);
         until([&] { return pose.values.back() == value; });
-        longest = std::max(longest, clock::now() - std::exchange(last, clock::now()));
+        const auto now = std::chrono::steady_clock::now();
+        pauses += now - last > lease / 4 ? 1 : 0;
+        last = now;
     }
-    BOOST_TEST((pose.lost == 0 || longest > lease / 4), pose.lost << " times lost");
+    BOOST_TEST(pose.lost <= pauses);
     BOOST_TEST(counted(*car2, "requests_sent") > 5U);
     pose.feed.close();
 }
