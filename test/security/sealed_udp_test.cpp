@@ -314,23 +314,19 @@ BOOST_AUTO_TEST_SUITE_END()
 BOOST_AUTO_TEST_SUITE(feeds)
 
 BOOST_AUTO_TEST_CASE(leases_are_renewed) {
-    lease = 40ms;
+    lease = 200ms; // long enough for a busy machine to renew it in time
     start_car2();
     followed pose;
     car1->update("pose", 0);
     pose.bind(*car2, "car1:pose");
     until([&] { return pose.values.size() == 1; });
     const auto begun = std::chrono::steady_clock::now();
-    int pauses = 0; // of this process, on a busy machine: after each, a lease may be over
     int value = 0;
-    for (auto last = begun; last - begun < 400ms;) {
+    while (std::chrono::steady_clock::now() - begun < 10 * lease) {
         car1->update("pose", ++value);
         until([&] { return pose.values.back() == value; });
-        const auto now = std::chrono::steady_clock::now();
-        pauses += now - last > lease / 4 ? 1 : 0;
-        last = now;
     }
-    BOOST_TEST(pose.lost <= pauses);
+    BOOST_TEST(pose.lost == 0);
     BOOST_TEST(counted(*car2, "requests_sent") > 5U);
     pose.feed.close();
 }

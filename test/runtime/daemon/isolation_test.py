@@ -396,7 +396,7 @@ class Restart(unittest.TestCase):
     def test_a_stop_during_a_restart(self):
         with Folder() as f:
             slow = f.file("slow")
-            with IsolatingDaemon(plugin(f"slow_while: {slow}", f"read: [{f.path}]")) as d:
+            with Daemon(plugin(f"slow_while: {slow}", f"read: [{f.path}]")) as d:
                 f.write("", "slow")
                 self.assertEqual(body(d.ask("DELEGATE self:aborts"))["error"], "failed")
                 d.wait_for_entry("Restarting.")
@@ -431,7 +431,7 @@ class Start(unittest.TestCase):
             self.assertEqual((code, out), (2, ""), err)
             self.assertIn(words, said)
             self.assertIn(": plugins[1].", said)
-        with IsolatingDaemon(entry + "    required: false\n") as d:
+        with Daemon(entry + "    required: false\n") as d:
             entry = d.wait_for_entry("continuing without it")
             self.assertIn(words, entry["message"])
             self.assertNotIn("error", json.loads(d.ask("PULL self:cles/metrics")))
@@ -479,7 +479,7 @@ class Start(unittest.TestCase):
     def test_many_workers_and_little_memory(self):
         """The stacks of the daemon's threads do not count."""
         base = DEFAULTS.replace("workers: 2", "workers: 60")
-        with IsolatingDaemon(plugin(limits="memory: 64MiB"), base=base) as d:
+        with Daemon(plugin(limits="memory: 64MiB"), base=base) as d:
             self.assertEqual(d.ask("PULL self:quick"), '{"value":42}')
             self.assertEqual(d.stop()[0], 0)
 
@@ -523,7 +523,7 @@ class End(Isolated):
         self.assertFalse([e for e in self.daemon.entries() if e["level"] == "error"])
 
     def test_it_says_much_when_it_stops(self):
-        with IsolatingDaemon(plugin("talk_at_stop: true")) as d:
+        with Daemon(plugin("talk_at_stop: true")) as d:
             self.assertEqual(d.ask("PULL self:last_words"), '{"value":true}')
             self.assertEqual(d.stop()[0], 0)
             self.assertNotIn("did not stop in time", d.log())
@@ -695,7 +695,7 @@ class Shipped(unittest.TestCase):
             self.skipTest("they are not built")
         names = ("system", "primes", "sgd", "fmv", "strike")
         entries = "".join(f"  - path: {PLUGINS}/libcles-{name}.so\n    isolation: process\n" for name in names)
-        with IsolatingDaemon("plugins:\n" + entries) as d:
+        with Daemon("plugins:\n" + entries) as d:
             self.assertIn("seconds", body(d.ask("PULL self:utc")))
             for task in ("load", "memory", "disk", "network", "processes"):
                 with self.subTest(task):
@@ -715,8 +715,8 @@ class Same(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         alone = f"plugins:\n  - path: {HOSTILE}\n"
-        cls.here = IsolatingDaemon(alone)
-        cls.there = IsolatingDaemon(alone + "    isolation: process\n")
+        cls.here = Daemon(alone)
+        cls.there = Daemon(alone + "    isolation: process\n")
 
     @classmethod
     def tearDownClass(cls):

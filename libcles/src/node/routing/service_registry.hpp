@@ -91,9 +91,9 @@ struct known_node : candidate, query_target {
 };
 
 /// Which other nodes offer which tasks: follows `membership`, and queries the tasks of a node when its announced digest
-/// changes. Nodes with the same digest offer the same tasks, and they are queried one at a time until one
-/// replies. The cost of an announcement or of a failed query does not depend on the number of known nodes, except that
-/// those of its digest at a URL that fails are queued, each once for each of its turns.
+/// changes. Nodes with the same digest offer the same tasks, and they are queried one at a time until one replies. The
+/// cost of an announcement or of a failed query does not depend on the number of known nodes, except that those of its
+/// digest at a URL that fails are queued, each once for each of its turns.
 class service_registry final : private deadline {
   public:
     struct offer {
