@@ -13,8 +13,7 @@ import signal
 import subprocess
 import sys
 
-from demo_cluster import end
-from demo_support import free_port, heading
+from demo_support import end, free_port, heading
 from jadc2_fleet import PATIENCE, RIGHTS, DeferredSignals, Fleet, Trouble, clean_environment
 
 

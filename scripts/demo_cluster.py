@@ -21,12 +21,11 @@ import sys
 import tempfile
 import time
 
-from demo_support import Trouble, heading
+from demo_support import PATIENCE, Trouble, end, heading
 
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 NAMES = ["sat1", "sat2", "sat3", "sat4"]
 FIRST, ASKED = "sat1", "sat2"  # the seed of the others; the daemon that gets all requests
-PATIENCE = 30  # seconds; everything takes far less
 SPREAD, UNDER_FIRE = 60, 80  # jobs
 CHAIN = ["car1", "car2", "car3", "car4"]
 JOB_SECONDS = 0.1  # intended duration of a job
@@ -71,28 +70,6 @@ def patient(question, what):
             raise Trouble(f"timed out: {what}")
         time.sleep(0.01)
     return answer
-
-
-def wait_for_end(process, seconds):
-    """Whether it ends within that time. `Popen.wait` would wait for ever: an interrupt during an earlier call may leave its
-    lock held."""
-    until = time.monotonic() + seconds
-    while True:
-        try:
-            if os.waitpid(process.pid, os.WNOHANG)[0] == process.pid:
-                return True
-        except ChildProcessError:  # it has been waited for
-            return True
-        if time.monotonic() > until:
-            return False
-        time.sleep(0.01)
-
-
-def end(process, seconds):
-    """Waits that long for its end, and then kills it."""
-    if not wait_for_end(process, seconds):
-        process.kill()
-        wait_for_end(process, PATIENCE)
 
 
 class Link:

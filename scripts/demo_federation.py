@@ -14,7 +14,8 @@ import subprocess
 import sys
 import time
 
-from demo_cluster import PATIENCE, Cluster, Link, Trouble, heading, patient, run, show
+from demo_cluster import Cluster, Link, patient, run, show
+from demo_support import PATIENCE, Trouble, heading
 from nats_server import PROGRAM, NatsServer
 
 HUB, GATE, INNER = "hub", "gate", "car1"

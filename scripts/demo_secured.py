@@ -15,9 +15,7 @@ import sys
 import tempfile
 import time
 
-from demo_support import Trouble, free_port, heading
-
-PATIENCE = 20  # seconds; everything takes far less
+from demo_support import PATIENCE, Trouble, free_port, heading
 
 
 class Fleet:

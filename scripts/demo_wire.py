@@ -8,9 +8,7 @@
 import socket
 import sys
 
-from demo_support import heading
-
-PATIENCE = 10  # seconds
+from demo_support import PATIENCE, heading
 
 
 class Wire:
