@@ -19,6 +19,9 @@ std::chrono::milliseconds pause_after(unsigned failures) noexcept {
 
 } // namespace
 
+query_scheduler::query_scheduler(std::function<void(query_target&)> on_postponed)
+    : on_postponed_(std::move(on_postponed)) {}
+
 void query_scheduler::enter(query_target& who) {
     if (who.at_ == query_target::place::nowhere) {
         who.at_ = query_target::place::fresh;
@@ -51,11 +54,6 @@ bool query_scheduler::remove(query_target& who) {
     return was != query_target::place::nowhere;
 }
 
-bool query_scheduler::is_failing(const query_target& who) const {
-    const auto found = endpoints_.find(who.where);
-    return found != endpoints_.end() && found->second.failures != 0;
-}
-
 query_target* query_scheduler::next(time_point now) {
     if (asked_ >= at_once || now < open_at()) {
         return nullptr;
@@ -68,8 +66,8 @@ query_target* query_scheduler::next(time_point now) {
     return found;
 }
 
-// The newest, or the oldest if the waiting ones came first. Those whose URL is known to fail wait there with the
-// others.
+// The newest, or the oldest if the waiting ones came first. Those whose URL is in a pause, or is tried by another after
+// one, wait with the others of that URL.
 query_target* query_scheduler::take_fresh(time_point now) {
     while (!fresh_.empty()) {
         ++steps_;
@@ -77,11 +75,12 @@ query_target* query_scheduler::take_fresh(time_point now) {
         auto& who = *which->second;
         fresh_.erase(which);
         auto& e = at(who);
-        if (e.failures == 0) {
+        if (e.failures == 0 || (e.asking == 0 && e.closed_until <= now)) {
             mark_asked(who, e);
             return &who;
         }
         wait(who, now);
+        on_postponed_(who);
     }
     return nullptr;
 }

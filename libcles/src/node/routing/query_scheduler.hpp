@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <set>
@@ -31,7 +32,7 @@ struct query_target {
 /// Decides which nodes are asked next, and when. Anyone may announce any number of names, so queries are limited: in
 /// number at once, in their rate of failures, and by pauses that grow with each failure of a node and of a URL that
 /// several nodes claim. Nodes that were never asked, the newest first, alternate with those whose pause is over, so
-/// that many dead names do not delay a new live one. Each operation is logarithmic in the number of waiting nodes.
+/// that many dead names do not delay a new live one. Each step of a node is logarithmic in the number of waiting nodes.
 class query_scheduler {
   public:
     static constexpr std::size_t at_once = 16;
@@ -40,7 +41,9 @@ class query_scheduler {
     static constexpr std::chrono::milliseconds per_failure{50}; ///< average time between failures, at least
     static constexpr std::chrono::milliseconds burst{1'600};    ///< how much of that may be used in advance
 
-    query_scheduler() = default;
+    /// `next` calls `on_postponed` for each entered node whose turn comes later, perhaps in a minute, because its URL
+    /// is in a pause or is tried by another node after one. `on_postponed` may call `enter`, but not `remove`.
+    explicit query_scheduler(std::function<void(query_target&)> on_postponed);
     query_scheduler(const query_scheduler&) = delete;
     query_scheduler& operator=(const query_scheduler&) = delete;
 
@@ -54,8 +57,6 @@ class query_scheduler {
     void answered(query_target& who);
     /// It has not replied, and waits for another turn. `unreachable`: no query gets through to its URL.
     void failed(query_target& who, bool unreachable, time_point now);
-    /// Whether its URL could not be reached, and nothing has been answered there since: it may have to wait for long.
-    [[nodiscard]] bool is_failing(const query_target& who) const;
     /// When `next` may return a node; nothing if that depends on other events.
     [[nodiscard]] std::optional<time_point> due() const noexcept;
 
@@ -86,6 +87,7 @@ class query_scheduler {
     query_target* take_fresh(time_point now);
     query_target* take_waiting(time_point now);
 
+    std::function<void(query_target&)> on_postponed_;
     std::map<std::uint64_t, query_target*> fresh_; // not asked since it was entered, the newest last
     endpoints endpoints_;
     std::set<std::tuple<time_point, std::uint64_t, endpoint*>> schedule_; // those with a waiting node that can be asked

@@ -62,7 +62,9 @@ std::optional<task_list> read_task_list(std::string_view description, std::strin
 }
 
 service_registry::service_registry(node_state& host, next_hop& out, std::function<void()> on_offers)
-    : node_(host), out_(out), on_offers_(std::move(on_offers)), alive_(std::make_shared<service_registry*>(this)) {
+    : node_(host), out_(out), on_offers_(std::move(on_offers)),
+      queries_([this](query_target& n) { on_postponed(static_cast<known_node&>(n)); }),
+      alive_(std::make_shared<service_registry*>(this)) {
     node_.peers.observe([this](std::string_view name) { on_member_seen(name); });
 }
 
@@ -243,21 +245,23 @@ void service_registry::ask(time_point now) {
     follow();
 }
 
+// Its turn may be a minute away: neither requests nor the others of its digest wait for it.
+void service_registry::on_postponed(known_node& n) {
+    expect(n, {});
+    if (auto* k = digest_group_of(n); k != nullptr && k->asked == nullptr) {
+        wake_next(*k);
+    }
+}
+
 void service_registry::wake_next(digest_group& of) {
     of.asked = nullptr;
-    while (!of.waiting.empty()) {
-        auto& next = *of.waiting.begin()->second;
-        const bool failing = queries_.is_failing(next);
-        if (!failing) {
-            expect_next(of);
-        }
-        of.waiting.erase(of.waiting.begin());
-        wait_for_turn(next);
-        if (!failing) {
-            return;
-        }
-        // Its turn may be a minute away: the others do not wait for it.
+    if (of.waiting.empty()) {
+        return;
     }
+    expect_next(of);
+    auto& next = *of.waiting.begin()->second;
+    of.waiting.erase(of.waiting.begin());
+    wait_for_turn(next);
 }
 
 // The next one to be asked has waited for the replies of others, and is waited for from now on.

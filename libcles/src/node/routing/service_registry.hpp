@@ -93,7 +93,7 @@ struct known_node : candidate, query_target {
 /// Which other nodes offer which tasks: follows `membership`, and queries the tasks of a node when its announced digest
 /// changes. Nodes with the same digest offer the same tasks, and they are queried one at a time until one replies. The
 /// cost of an announcement or of a failed query does not depend on the number of known nodes, except that those of its
-/// digest at a URL that fails are queued, each once for each of its turns.
+/// digest at a failing URL are queued once for each pause of that URL.
 class service_registry final : private deadline {
   public:
     struct offer {
@@ -112,7 +112,8 @@ class service_registry final : private deadline {
     /// For the task `cles`: all nodes. Valid until the next change.
     [[nodiscard]] const std::vector<offer>& offers(verb v, std::string_view task) const;
     /// Whether the tasks of further nodes may become known at any moment. A node is waited for from when it is first
-    /// received, and from its turn after other nodes of its digest; each time for a second.
+    /// received, and from its turn after other nodes of its digest; each time for a second, and not during a pause of
+    /// its URL.
     [[nodiscard]] bool expects_more() const noexcept { return !expected_.empty(); }
     /// Null if it is not known.
     [[nodiscard]] known_node* find(std::string_view name) noexcept;
@@ -144,6 +145,7 @@ class service_registry final : private deadline {
     void on_reply(const std::string& name, std::uint64_t ticket, std::string_view said, const subrequest_failure* why);
     void on_tasks(known_node& of, task_list list);
     void on_no_reply(known_node& of, bool unreachable, time_point now);
+    void on_postponed(known_node& n);
     void wake_next(digest_group& of);
     void expect_next(const digest_group& of);
     void follow();

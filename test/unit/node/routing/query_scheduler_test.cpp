@@ -41,7 +41,8 @@ struct fixture {
 
     cles::test::manual_clock clock;
     std::vector<std::unique_ptr<query_target>> nodes;
-    queue asks;
+    std::vector<query_target*> postponed;
+    queue asks{[this](query_target& who) { postponed.push_back(&who); }};
 };
 
 } // namespace
@@ -98,9 +99,25 @@ BOOST_AUTO_TEST_CASE(names_at_one_dead_url_share_its_pause) {
         node("tcp://127.0.0.1:9");
     }
     BOOST_TEST(fail_for(1s) == 1U);
+    BOOST_TEST(postponed.size() == 1023U);
     BOOST_TEST(fail_for(60s) <= 6U);
     auto& live = node("tcp://127.0.0.1:10");
     BOOST_TEST(next() == &live);
+}
+
+BOOST_AUTO_TEST_CASE(a_new_node_at_a_failing_url_is_asked_after_its_pause) {
+    node("tcp://127.0.0.1:9");
+    fails(*next());
+    clock.advance(2s - 1ms);
+    auto& early = node("tcp://127.0.0.1:9");
+    BOOST_TEST(next() == nullptr);
+    BOOST_TEST((postponed == std::vector{&early}));
+    clock.advance(1ms);
+    auto& late = node("tcp://127.0.0.1:9");
+    const auto* first = next();
+    BOOST_TEST(next() == nullptr); // only one tries
+    BOOST_TEST(first != nullptr);
+    BOOST_TEST(postponed.size() == (first == &late ? 1U : 2U));
 }
 
 BOOST_AUTO_TEST_CASE(when_a_dead_url_answers_again_all_its_nodes_are_asked) {

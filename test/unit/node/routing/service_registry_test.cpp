@@ -5,6 +5,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <string>
 
@@ -29,6 +30,27 @@ struct fixture : cles::test::routing_fixture {
     void hear_at(const std::string& name, const std::string& url, const std::string& digest) {
         node.host->peers.apply_announcement({.node = name, .endpoints = {url}, .interval = 60s, .tasks = digest},
                                             run_of(name), ++seq[name], from(name), node.clock.now());
+    }
+    /// As many failures as are allowed at once: queries have to wait for their turn then.
+    void use_up_failures() {
+        int failed = 0;
+        do {
+            hear_at("n" + std::to_string(failed), "tcp://127.0.0.1:" + std::to_string(100 + failed), "");
+            fail_all();
+            BOOST_REQUIRE_LT(++failed, 100);
+        } while (ways.count() == static_cast<std::size_t>(failed));
+        leave("n" + std::to_string(failed - 1));
+    }
+    static std::string url_of(const std::string& name) { return "tcp://127.0.0.1:" + name.substr(name.size() - 1); }
+    /// Three nodes of one digest; returns them in the order of their turns. The first one is being asked.
+    std::array<std::string, 3> ask_one_of_three() {
+        for (int i = 1; i <= 3; ++i) {
+            const auto name = "same" + std::to_string(i);
+            hear_at(name, url_of(name), "same");
+        }
+        node.pass(50ms);
+        const auto first = ways.open().node;
+        return {first, first == "same1" ? "same2" : "same1", first == "same3" ? "same2" : "same3"};
     }
     void fail_all() {
         while (ways.count_open() != 0) {
@@ -139,26 +161,32 @@ BOOST_AUTO_TEST_CASE(a_live_node_is_waited_for_behind_many_silent_ones_of_its_di
 }
 
 BOOST_AUTO_TEST_CASE(a_node_is_asked_if_the_one_before_it_of_its_digest_has_left_before_its_turn) {
-    int failed = 0;
-    do { // as many failures as are allowed at once: then queries have to wait for their turn
-        hear_at("n" + std::to_string(failed), "tcp://127.0.0.1:" + std::to_string(100 + failed), "");
-        fail_all();
-        BOOST_REQUIRE_LT(++failed, 100);
-    } while (ways.count() == static_cast<std::size_t>(failed));
-    leave("n" + std::to_string(failed - 1));
-    for (int i = 1; i <= 3; ++i) {
-        hear_at("same" + std::to_string(i), "tcp://127.0.0.1:" + std::to_string(i), "same");
-    }
-    node.pass(50ms);
-    const auto first = ways.open().node;
+    use_up_failures();
+    const auto [first, second, third] = ask_one_of_three();
     ways.open().fails(errc::deadline, "no answer was received in time");
     BOOST_TEST(ways.count_open() == 0U);
-    const std::string second = first == "same1" ? "same2" : "same1";
-    const std::string third = first == "same3" ? "same2" : "same3";
-    leave(second); // it would be asked next
+    leave(second);
     node.pass(500ms);
     BOOST_TEST(ways.count_open() == 1U);
     BOOST_TEST(ways.to(third).text == "PULL " + third + ":cles");
+}
+
+BOOST_AUTO_TEST_CASE(a_node_is_asked_if_the_url_of_the_one_before_it_of_its_digest_fails_before_its_turn) {
+    use_up_failures();
+    const auto [first, second, third] = ask_one_of_three();
+    hear_at("other", url_of(second), "");
+    ways.to(first).fails(errc::deadline, "no answer was received in time");
+    BOOST_TEST(routing->expects_more());
+    ways.to("other").fails(boost::system::errc::make_error_code(boost::system::errc::connection_refused), "refused");
+    BOOST_TEST(ways.count_open() == 0U);
+    node.pass(500ms);
+    BOOST_TEST(ways.count_open() == 1U);
+    BOOST_TEST(ways.to(third).text == "PULL " + third + ":cles");
+    node.pass(999ms);
+    BOOST_TEST(routing->expects_more());
+    ways.to(third).answers(description(third, task("PULL", "speed")));
+    BOOST_TEST(!routing->expects_more());
+    BOOST_TEST(offered_by(verb::pull, "speed") == "same1 same2 same3");
 }
 
 BOOST_AUTO_TEST_CASE(nodes_at_a_closed_port_do_not_delay_another_of_their_digest) {
@@ -170,6 +198,20 @@ BOOST_AUTO_TEST_CASE(nodes_at_a_closed_port_do_not_delay_another_of_their_digest
     BOOST_TEST(ways.open().text == "PULL live:cles");
     ways.open().answers(description("live", task("PULL", "speed")));
     BOOST_TEST(!routing->expects_more());
+}
+
+BOOST_AUTO_TEST_CASE(requests_wait_for_a_new_node_at_a_closed_port_after_its_pause) {
+    hear_at("old", "tcp://127.0.0.1:9", "one");
+    fail_all();
+    leave("old");
+    hear_at("early", "tcp://127.0.0.1:9", "two");
+    BOOST_TEST(ways.count_open() == 0U);
+    BOOST_TEST(!routing->expects_more());
+    leave("early");
+    node.pass(2s);
+    hear_at("late", "tcp://127.0.0.1:9", "three");
+    BOOST_TEST(ways.open().text == "PULL late:cles");
+    BOOST_TEST(routing->expects_more());
 }
 
 BOOST_AUTO_TEST_CASE(nodes_without_a_digest_are_asked_separately) {
