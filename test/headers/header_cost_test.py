@@ -7,7 +7,7 @@
 `registrar.hpp` and the headers for plugins include no Asio. `service.hpp` has few lines beyond those of the standard
 library and of Asio that its interface needs, as the preprocessor counts them on this machine. Of a request or a feed that
 a coroutine awaits, a program compiles only what depends on the type of the result: how it is read. A service on an
-`io_context` does not have its users compile Asio's executors.
+`io_context` does not have its users compile Asio's executors, nor how the map of its peers is copied and destroyed.
 """
 
 import argparse
@@ -48,10 +48,21 @@ CALLING = """
 #include <boost/asio/io_context.hpp>
 
 void ask(boost::asio::io_context& io) {
-    cles::service node{io, {.name = "me"}};
+    cles::service node{io, {.name = "me", .peers = {{"car0", "tcp://127.0.0.1"}}}};
     node.async_pull<int>("car0:speed", [](boost::system::error_code, int) {});
 }
 """
+
+COPYING = """
+#include <map>
+#include <string>
+
+std::map<std::string, std::string> copy(const std::map<std::string, std::string>& other) { return other; }
+"""
+
+
+def map_functions(names: list[str]) -> list[str]:
+    return [name for name in names if "_Rb_tree" in name and re.search("_M_(copy|erase|insert)", name)]
 
 
 class Compiler:
@@ -122,6 +133,11 @@ def main() -> int:
     if executors:
         failures.append(f"{len(executors)} functions of Asio's executors are compiled for a service on an io_context, first "
                         f"{executors[0]}")
+
+    if not map_functions(compiler.functions_of(COPYING)):
+        failures.append("a program that copies a std::map has no function of it: this test does not recognise it")
+    if maps := map_functions(functions):
+        failures.append(f"{len(maps)} functions of std::map are compiled for the peers of a service, first {maps[0]}")
 
     print("\n".join([*failures, f"{len(light)} headers without Asio; service.hpp: {all_lines} lines, {needed} of them of the "
                                 f"standard library and of Asio"]))

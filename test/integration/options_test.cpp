@@ -2,6 +2,7 @@
 // Every option of the public structs at its minimum, at its maximum and beyond both: it works, or it is refused with an
 // error that names it.
 
+#include <cles/convert_containers.hpp>
 #include <cles/limit_ranges.hpp>
 #include <cles/run.hpp>
 #include <cles/service.hpp>
@@ -21,8 +22,10 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 BOOST_AUTO_TEST_SUITE(options)
@@ -45,6 +48,34 @@ std::string refusal_of(const cles::limits& bounds) {
         return e.message();
     }
     return {};
+}
+
+BOOST_AUTO_TEST_CASE(peers_can_be_used_as_a_standard_map) {
+    using map = std::map<std::string, std::string>;
+    const map others{{"car2", "tcp://127.0.0.1:1"}};
+    cles::service_options options{.name = "car1", .peers = others};
+    options.peers["car3"] = "tcp://127.0.0.1:2";
+    const auto copy = options;
+    const auto moved = std::move(options);
+    BOOST_TEST((copy.peers == moved.peers));
+    BOOST_TEST(moved.peers.at("car3") == "tcp://127.0.0.1:2");
+
+    options.peers = {};
+    BOOST_TEST(options.peers.empty());
+    options.peers = {{"car4", "tcp://127.0.0.1:4"}};
+    BOOST_TEST(options.peers.size() == 1U);
+    options.peers = others;
+    options.peers = map{others};
+    options.peers = {others.begin(), others.end()};
+    map plain = options.peers;
+    plain.clear();
+    options.peers.swap(plain);
+    BOOST_TEST((options.peers.empty() && plain == others));
+    plain = std::move(options.peers);
+
+    const cles::service_options read{.name = "car1", .peers = cles::from_json<cles::peer_urls>(cles::to_json(others))};
+    BOOST_TEST((read.peers == others));
+    BOOST_TEST(cles::to_json(read.peers) == cles::to_json(others));
 }
 
 BOOST_AUTO_TEST_CASE(a_limit_is_taken_within_its_range_and_refused_by_name_beyond_it) {

@@ -4,6 +4,7 @@
 #include <cles/call_options.hpp>
 #include <cles/cancellation.hpp>
 #include <cles/chrono.hpp>
+#include <cles/convert.hpp>
 #include <cles/coroutine_handler.hpp>
 #include <cles/error.hpp>
 #include <cles/feed.hpp>
@@ -32,6 +33,7 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <string>
@@ -67,12 +69,29 @@ using service_part = std::function<void(asio_port::asio_environment&, core::node
 struct tracing_part;
 } // namespace detail
 
+/// URLs of nodes, by name. A std::map that the library copies, assigns and destroys, so that a user's file compiles
+/// less.
+struct peer_urls : std::map<std::string, std::string> {
+    using map::map;
+    peer_urls() = default;
+    peer_urls(std::initializer_list<value_type> urls);
+    peer_urls(const map& urls);
+    peer_urls(map&& urls) noexcept;
+    peer_urls(const peer_urls& other);
+    peer_urls(peer_urls&& other) noexcept;
+    peer_urls& operator=(const peer_urls& other);
+    peer_urls& operator=(peer_urls&& other) noexcept;
+    ~peer_urls();
+};
+template <std::same_as<peer_urls> Urls>
+struct converter<Urls> : converter<typename Urls::map> {}; // a template: convert_containers.hpp may be missing
+
 /// The configuration of a service. Only the name is required.
 struct service_options {
-    std::string name{};                         ///< 1 to 64 letters, digits, '_', '-', '.'; not self, any, all
-    std::vector<std::string> listen{};          ///< link URLs, see docs/links.md; none: it does not listen
-    std::map<std::string, std::string> peers{}; ///< URLs of other nodes, by name
-    bool insecure = false;                      ///< allow listening beyond this host without credentials
+    std::string name{};                ///< 1 to 64 letters, digits, '_', '-', '.'; not self, any, all
+    std::vector<std::string> listen{}; ///< link URLs, see docs/links.md; none: it does not listen
+    peer_urls peers{};                 ///< URLs of other nodes, by name
+    bool insecure = false;             ///< allow listening beyond this host without credentials
     /// `cles::secured(directory)` authenticates all peers and encrypts what is sent to other hosts
     /// (<cles/security.hpp>, docs/security.md). Each service needs its own.
     detail::service_part security{};

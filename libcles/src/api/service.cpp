@@ -11,12 +11,22 @@
 
 #include <functional>
 #include <future>
+#include <initializer_list>
 #include <optional>
 #include <type_traits>
 #include <utility>
 
 namespace cles {
 namespace asio = boost::asio;
+
+peer_urls::peer_urls(std::initializer_list<value_type> urls) : map(urls) {}
+peer_urls::peer_urls(const map& urls) : map(urls) {}
+peer_urls::peer_urls(map&& urls) noexcept : map(std::move(urls)) {}
+peer_urls::peer_urls(const peer_urls& other) = default;
+peer_urls::peer_urls(peer_urls&& other) noexcept = default;
+peer_urls& peer_urls::operator=(const peer_urls& other) = default;
+peer_urls& peer_urls::operator=(peer_urls&& other) noexcept = default;
+peer_urls::~peer_urls() = default;
 
 namespace {
 
