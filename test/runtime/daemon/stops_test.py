@@ -80,9 +80,9 @@ class Stops(unittest.TestCase):
                     break
                 blockers = [f"again{attempt}"]
             self.assertLessEqual(min(delays), 50)
-        entry = self.daemon.wait_for_entry("on_stop callback does not return")
+        # On a busy machine, others may seem to block, too.
+        entry = self.daemon.wait_for_entry("'blocks_when_stopped': its on_stop callback does not return")
         self.assertEqual(entry["level"], "warning")
-        self.assertIn("blocks_when_stopped", entry["message"])
         # A job that polls sees it at once, and its worker is free.
         with self.daemon.connect() as link:
             link.send("DELEGATE sat1:waits/nothing id=1 deadline=60000")
