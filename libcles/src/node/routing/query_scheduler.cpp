@@ -75,7 +75,7 @@ query_target* query_scheduler::take_fresh(time_point now) {
         auto& who = *which->second;
         fresh_.erase(which);
         auto& e = at(who);
-        if (e.failures == 0 || (e.asking == 0 && e.closed_until <= now)) {
+        if (e.has_room() && e.closed_until <= now) {
             mark_asked(who, e);
             return &who;
         }
@@ -154,7 +154,7 @@ void query_scheduler::schedule(endpoint& e) {
         schedule_.erase({*e.scheduled, e.number, &e});
         e.scheduled.reset();
     }
-    if (!e.waiting.empty() && (e.failures == 0 || e.asking == 0)) {
+    if (!e.waiting.empty() && e.has_room()) {
         e.scheduled = std::max(e.closed_until, std::get<time_point>(*e.waiting.begin()));
         schedule_.emplace(*e.scheduled, e.number, &e);
     }

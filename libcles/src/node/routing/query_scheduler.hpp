@@ -73,6 +73,8 @@ class query_scheduler {
         turns waiting{};
         std::optional<time_point> scheduled{};
 
+        /// After a failure, one node at a time is asked there.
+        [[nodiscard]] bool has_room() const noexcept { return failures == 0 || asking == 0; }
         [[nodiscard]] bool is_idle() const noexcept { return failures == 0 && asking == 0 && waiting.empty(); }
     };
     using endpoints = std::unordered_map<std::string, endpoint>;
