@@ -15,7 +15,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <functional>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -310,6 +312,137 @@ BOOST_DATA_TEST_CASE(a_feed_outlives_its_service_and_fails_with_stopped, carrier
     feed.async_next([&](boost::system::error_code failed, const cles::feed_item<cles::json_text>&) { code = failed; });
     run_until(n.io, [&] { return code.failed(); });
     BOOST_TEST(code == errc::stopped);
+}
+
+// More than are delivered in one function.
+BOOST_DATA_TEST_CASE(a_handler_that_waits_again_gets_all_events_also_if_it_throws, carriers, kind) {
+    nodes n{kind};
+    cles::feed<int> feed;
+    n.tower->async_bind<int>("car1:place", cles::bind_options{}.keep(100),
+                             [&](boost::system::error_code, cles::feed<int> made) { feed = std::move(made); });
+    run_until(n.io, [&] { return feed.is_open(); });
+    std::vector<int> expected;
+    for (int i = 1; i <= 50; ++i) {
+        n.car->update("place", i);
+        expected.push_back(i);
+    }
+    run_ready(n.io); // they are queued
+    std::vector<int> got;
+    std::function<void(boost::system::error_code, const cles::feed_item<int>&)> take =
+        [&](boost::system::error_code, const cles::feed_item<int>& item) {
+            got.push_back(item.value);
+            if (got.size() < expected.size()) {
+                feed.async_next(take);
+            }
+            if (got.size() % 5 == 0) {
+                throw std::runtime_error("a handler's");
+            }
+        };
+    feed.async_next(take);
+    int thrown = 0;
+    boost::asio::io_context idle;
+    run_until(idle, [&] {
+        try {
+            n.io.restart();
+            n.io.poll();
+        } catch (const std::runtime_error&) {
+            ++thrown;
+        }
+        return got.size() == expected.size();
+    });
+    BOOST_TEST((got == expected));
+    BOOST_TEST(thrown == 10);
+}
+
+BOOST_AUTO_TEST_CASE(one_function_delivers_several_events_that_wait) {
+    nodes n{carrier::inproc};
+    cles::feed<int> slow;
+    n.tower->async_bind<int>("car1:place",
+                             [&](boost::system::error_code, cles::feed<int> made) { slow = std::move(made); });
+    run_until(n.io, [&] { return slow.is_open(); });
+    for (int i = 0; i < 48; ++i) {
+        n.car->update("place", i);
+    }
+    run_ready(n.io);
+    int got = 0;
+    std::function<void(boost::system::error_code, const cles::feed_item<int>&)> take =
+        [&](boost::system::error_code, const cles::feed_item<int>&) {
+            if (++got != 48) {
+                slow.async_next(take);
+            }
+        };
+    slow.async_next(take);
+    n.io.restart();
+    int functions = 0;
+    while (got != 48 && n.io.poll_one() != 0) {
+        ++functions;
+    }
+    BOOST_TEST(got == 48);
+    BOOST_TEST(functions < 16); // 3 are needed, and others may be due
+}
+
+BOOST_DATA_TEST_CASE(a_handler_may_wait_again_and_then_end_its_feed,
+                     boost::unit_test::data::make({"close", "destroy", "stop", "destroy the service", "cancel"}), how) {
+    nodes n{carrier::tcp4};
+    auto feed = std::make_unique<cles::feed<int>>();
+    n.tower->async_bind<int>("car1:place",
+                             [&](boost::system::error_code, cles::feed<int> made) { *feed = std::move(made); });
+    run_until(n.io, [&] { return feed->is_open(); });
+    for (int i = 1; i <= 3; ++i) {
+        n.car->update("place", i);
+    }
+    run_ready(n.io);
+    const std::string what = how;
+    boost::asio::cancellation_signal signal;
+    std::vector<boost::system::error_code> second;
+    int first = 0;
+    feed->async_next([&](boost::system::error_code, const cles::feed_item<int>& item) {
+        first = item.value;
+        feed->async_next(boost::asio::bind_cancellation_slot(
+            signal.slot(),
+            [&](boost::system::error_code code, const cles::feed_item<int>&) { second.push_back(code); }));
+        if (what == "close") {
+            feed->close();
+        } else if (what == "destroy") {
+            feed.reset();
+        } else if (what == "stop") {
+            n.tower->stop();
+        } else if (what == "destroy the service") {
+            n.tower.reset();
+        } else {
+            signal.emit(boost::asio::cancellation_type::terminal);
+        }
+    });
+    run_until(n.io, [&] { return !second.empty(); });
+    run_ready(n.io);
+    BOOST_TEST(first == 1);
+    BOOST_TEST(second.size() == 1U);
+    const bool stops = what == "stop" || what == "destroy the service";
+    BOOST_TEST(second.front() == (stops ? errc::stopped : errc::cancelled));
+}
+
+BOOST_AUTO_TEST_CASE(a_handler_may_run_the_executor_until_the_next_event_comes) {
+    nodes n{carrier::tcp4};
+    cles::feed<int> feed;
+    n.tower->async_bind<int>("car1:place",
+                             [&](boost::system::error_code, cles::feed<int> made) { feed = std::move(made); });
+    run_until(n.io, [&] { return feed.is_open(); });
+    for (int i = 1; i <= 3; ++i) {
+        n.car->update("place", i);
+    }
+    run_ready(n.io);
+    std::vector<int> got;
+    feed.async_next([&](boost::system::error_code, const cles::feed_item<int>& first) {
+        got.push_back(first.value);
+        feed.async_next([&](boost::system::error_code, const cles::feed_item<int>& second) {
+            got.push_back(second.value);
+            feed.async_next(
+                [&](boost::system::error_code, const cles::feed_item<int>& third) { got.push_back(third.value); });
+        });
+        run_until(n.io, [&] { return got.size() == 3; });
+    });
+    run_until(n.io, [&] { return got.size() == 3; });
+    BOOST_TEST((got == std::vector<int>{1, 2, 3}));
 }
 
 BOOST_AUTO_TEST_CASE(cancelling_a_wait_leaves_the_feed_as_it_was) {

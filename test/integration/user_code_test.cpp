@@ -96,7 +96,7 @@ namespace data = boost::unit_test::data;
 // Those of one noun share a binding.
 BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_deed) * data::make({false, true}), does,
                      share) {
-    for (const auto where : {place::reply, place::lost, place::cancelled, place::stop}) {
+    for (const auto where : {place::reply, place::queued, place::lost, place::cancelled, place::stop}) {
         BOOST_TEST_CONTEXT("at " << where) {
             world w;
             std::vector<std::unique_ptr<cles::feed<cles::json_text>>> feeds;
@@ -108,11 +108,21 @@ BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_de
             }
             w.until([&] { return feeds.size() == 3; });
             std::array<int, 3> calls{};
-            begin_three(w, does, calls, [&](std::size_t i, auto on_end) { feeds[i]->async_next(std::move(on_end)); });
-            if (where == place::reply) {
+            const auto update_all = [&] {
                 w.car->update("place", 1);
                 w.car->update("place1", 2);
                 w.car->update("place2", 3);
+            };
+            if (where == place::queued) {
+                update_all();
+                update_all();
+                w.run_what_is_ready();
+            }
+            begin_three(w, does, calls, [&](std::size_t i, auto on_end) { feeds[i]->async_next(std::move(on_end)); });
+            if (where == place::queued) {
+                // they are there
+            } else if (where == place::reply) {
+                update_all();
             } else if (where == place::lost) {
                 w.car.reset();
             } else if (where == place::cancelled) {

@@ -30,11 +30,11 @@ inline constexpr std::array<const char*, 7> deed_names{"nothing",          "thro
                                                        "destroys_service", "destroys_feed", "begins"};
 
 /// Where a completion comes from.
-enum class place : std::uint8_t { reply, refusal, deadline, lost, not_connected, cancelled, stop };
+enum class place : std::uint8_t { reply, refusal, deadline, lost, not_connected, cancelled, stop, queued };
 inline constexpr std::array every_place{place::reply,         place::refusal,   place::deadline, place::lost,
                                         place::not_connected, place::cancelled, place::stop};
-inline constexpr std::array<const char*, 7> place_names{"reply",         "refusal",   "deadline", "lost",
-                                                        "not_connected", "cancelled", "stop"};
+inline constexpr std::array<const char*, 8> place_names{"reply",         "refusal",   "deadline", "lost",
+                                                        "not_connected", "cancelled", "stop",     "queued"};
 
 inline std::ostream& operator<<(std::ostream& out, deed d) { return out << deed_names[static_cast<std::size_t>(d)]; }
 inline std::ostream& operator<<(std::ostream& out, place p) { return out << place_names[static_cast<std::size_t>(p)]; }

@@ -75,7 +75,7 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
         } else if (from.has_waiter()) {
             fail_next(executor(), std::move(operation), errc::busy, "another async_next of this feed is pending");
         } else if (from.next(std::move(operation))) {
-            asio::post(executor(), [&from, self = shared_from_this()] { from.pump(); });
+            pump_soon(from);
         }
     }
     /// It may be closed from inside its own event: functions up the stack still need it.
@@ -84,7 +84,22 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
     }
 
   private:
+    // A handler that waits again gets the next event in the same function, up to a number. When it waits, `fetch` posts
+    // the function for what remains: it may throw then, or run the executor until the next event comes.
+    void pump(core::feed_mailbox& mail) {
+        constexpr int most = 16;
+        is_pump_posted_ = false;
+        for (int left = most; left != 0 && mail.pump(); --left) {
+        }
+    }
+    void pump_soon(core::feed_mailbox& mail) {
+        if (!std::exchange(is_pump_posted_, true)) {
+            asio::post(executor(), [&mail, self = shared_from_this()] { self->pump(mail); });
+        }
+    }
+
     std::shared_ptr<engine> host_;
+    bool is_pump_posted_ = false;
 };
 
 /// A feed that is bound by a link.

@@ -38,11 +38,13 @@ bool feed_mailbox::next(event_ptr operation) {
     return !queue_.empty();
 }
 
-void feed_mailbox::pump() {
-    if (waiter_ != nullptr && !queue_.empty()) {
-        auto* operation = waiter_.release();
-        queue_.pop([operation](const detail::raw_event& event) { operation->deliver(event); }); // checked when queued
+bool feed_mailbox::pump() {
+    if (waiter_ == nullptr || queue_.empty()) {
+        return false;
     }
+    auto* operation = waiter_.release();
+    queue_.pop([operation](const detail::raw_event& event) { operation->deliver(event); }); // checked when queued
+    return true;
 }
 
 void feed_mailbox::cancel() {

@@ -75,7 +75,8 @@ class feed_mailbox {
     /// Waits for an event. \pre it is open, and nothing else waits. Returns true if an event is available: the caller
     /// then has to call `pump` later, since no operation may complete inside its initiation.
     bool next(event_ptr operation);
-    void pump();
+    /// Returns whether it has delivered an event.
+    bool pump();
     /// Cancels the waiting operation.
     [[gnu::cold]] void cancel();
     /// The same, if it is this one.
