@@ -49,8 +49,8 @@ class call_control {
     [[nodiscard]] virtual boost::asio::any_io_executor executor() const;
     /// Whether any thread may use it.
     [[nodiscard]] virtual bool is_thread_safe() const noexcept { return false; }
-    /// The call at the node that received the request; null in a plugin.
-    [[nodiscard]] virtual std::shared_ptr<core::call> node_call() const noexcept { return {}; }
+    /// The call at the node that received the request; null in a plugin. The reference is valid as long as this.
+    [[nodiscard]] virtual const std::shared_ptr<core::call>& node_call() const noexcept;
 };
 
 /// Replies with the exception: a `cles::error` with its code, anything else with `failed` and a message without file
@@ -132,7 +132,7 @@ class responder {
     /// Whether it may be used and destroyed on any thread: true for jobs on a pool of workers, and in plugins.
     [[nodiscard]] bool is_thread_safe() const noexcept { return call_->is_thread_safe(); }
     /// For <cles/sharing.hpp>.
-    [[nodiscard]] std::shared_ptr<core::call> node_call() const noexcept { return call_->node_call(); }
+    [[nodiscard]] const std::shared_ptr<core::call>& node_call() const noexcept { return call_->node_call(); }
 
   private:
     std::shared_ptr<detail::call_control> call_;

@@ -110,7 +110,7 @@ class service_call final : public call_control, public std::enable_shared_from_t
         }
     }
     [[nodiscard]] boost::asio::any_io_executor executor() const override { return executor_; }
-    [[nodiscard]] std::shared_ptr<core::call> node_call() const noexcept override { return call_; }
+    [[nodiscard]] const std::shared_ptr<core::call>& node_call() const noexcept override { return call_; }
 
   private:
     /// Its own requests that are in flight.

@@ -14,6 +14,11 @@ namespace detail {
 
 boost::asio::any_io_executor call_control::executor() const { throw error(errc::failed, "a plugin has no executor"); }
 
+const std::shared_ptr<core::call>& call_control::node_call() const noexcept {
+    static const std::shared_ptr<core::call> none;
+    return none;
+}
+
 void fail_with(call_control& call, const std::exception_ptr& thrown) {
     const auto why = core::describe(thrown);
     call.fail(why.code, why.message);

@@ -157,6 +157,7 @@ bool parse_adverbs(part_reader& parts, request_line& out, std::string& why) {
                 why = "the adverb " + quoted(a.key) + " is not known here";
                 return false;
             }
+            ++out.unknown_adverbs;
             continue;
         }
         const auto bit = 1U << known;

@@ -73,6 +73,7 @@ struct request_line : carried_adverbs {
     std::string_view since; ///< what the requester knows already
     routes_question routes{};
     std::uint64_t grant = 0;                   ///< of slots, or on which a job is forwarded; 0: none
+    std::size_t unknown_adverbs = 0;           ///< how many this version does not define for the verb
     std::string_view describe;                 ///< epochs of the incarnations to describe in full, separated by commas
     std::string_view body;                     ///< empty: none
     std::string_view text;                     ///< the whole line

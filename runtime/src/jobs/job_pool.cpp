@@ -136,8 +136,8 @@ void job_dispatcher::submit(const request& what, responder answer, std::shared_p
     pauses_.count_input();
     auto& r = acquire_record();
     r.assign(what, records_.copy_of(what.peer()), std::move(task));
-    const auto call = sharing_ ? answer.node_call() : nullptr;
-    r.movable = call && sharing_->may_move(*call);
+    const auto* const call = sharing_ ? answer.node_call().get() : nullptr;
+    r.movable = call != nullptr && sharing_->may_move(*call);
     r.note_phase(job_times::phase::queued);
     if (!what.trace().empty()) {
         answer.record_times({}, {}); // they follow
@@ -160,26 +160,28 @@ void job_dispatcher::submit(const request& what, responder answer, std::shared_p
             stop(*job);
         }
     });
-    if (admission == worker_pool::admission::needs_wake) {
-        wake_workers();
-    }
-    if (sharing_) {
-        sharing_->on_change();
+    const bool needs_wake = admission == worker_pool::admission::needs_wake;
+    if (needs_wake && (open_ == 1 || ++unwoken_jobs_ >= max_unwoken_jobs)) { // a single job starts at once
+        unwoken_jobs_ = 0;
+        workers_.wake();
+    } else if (needs_wake || sharing_) {
+        end_burst_later();
     }
 }
 
-// A single job starts at once. Otherwise more may come with the same read, and workers are woken for all together.
-void job_dispatcher::wake_workers() {
-    if (open_ == 1 || ++unwoken_jobs_ >= max_unwoken_jobs) {
-        unwoken_jobs_ = 0;
-        workers_.wake();
-    } else if (!std::exchange(wake_posted_, true)) {
-        asio::post(executor_, while_alive(weak_from_this(), [](job_dispatcher& self) {
-                       self.wake_posted_ = false;
-                       self.unwoken_jobs_ = 0;
-                       self.workers_.wake();
-                   }));
+// More jobs may come with the same read: workers are woken for all together, and others are told of those that wait.
+void job_dispatcher::end_burst_later() {
+    if (std::exchange(burst_end_posted_, true)) {
+        return;
     }
+    asio::post(executor_, while_alive(weak_from_this(), [](job_dispatcher& self) {
+                   self.burst_end_posted_ = false;
+                   self.unwoken_jobs_ = 0;
+                   self.workers_.wake();
+                   if (self.sharing_) {
+                       self.sharing_->on_change();
+                   }
+               }));
 }
 
 void job_dispatcher::refuse(responder& answer, worker_pool::admission why) {
@@ -290,8 +292,8 @@ void job_dispatcher::offer(job_taker& to) {
     const auto taken = workers_.take(
         most_offered,
         [&](const job_record& r, std::size_t ahead) {
-            const auto call = r.requester_ ? r.requester_->node_call() : nullptr;
-            return call && to.choose(*call, ahead);
+            const auto* const call = r.requester_ ? r.requester_->node_call().get() : nullptr;
+            return call != nullptr && to.choose(*call, ahead);
         },
         [&] { return to.full(); });
     for (auto* r : taken) {

@@ -137,7 +137,7 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
   private:
     job_record& acquire_record();
     void recycle(job_record& r);
-    void wake_workers();
+    void end_burst_later();
     void refuse(responder& answer, worker_pool::admission why);
 
     void process_completions();
@@ -180,7 +180,7 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
     std::size_t awaited_ = 0;              // of these, those that have not been told to stop
     std::size_t moved_ = 0;                // of these, those that other nodes run
     std::unique_ptr<job_sharing> sharing_; // null: jobs stay
-    bool wake_posted_ = false;
+    bool burst_end_posted_ = false;
     std::size_t unwoken_jobs_ = 0;
     std::vector<completion_queue::entry> entries_;
     std::vector<completion_queue::function> functions_;

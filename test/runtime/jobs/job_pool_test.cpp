@@ -6,7 +6,9 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <array>
 #include <atomic>
+#include <cstdint>
 #include <future>
 #include <memory>
 #include <mutex>
@@ -113,6 +115,67 @@ BOOST_FIXTURE_TEST_CASE(a_withdrawal_reported_after_the_job_has_ended_concerns_n
     wait_for([&] { return !second.empty(); });
     BOOST_TEST(second == "{}");
     BOOST_TEST(pool->figures().withdrawn == 0U);
+}
+
+namespace {
+
+/// Counts what the pool reports.
+class counting_sharing final : public cles::job_sharing {
+  public:
+    explicit counting_sharing(int& changes) : changes_(changes) {}
+    [[nodiscard]] bool may_move(const cles::core::call&) const noexcept override { return true; }
+    void on_change() override { ++changes_; }
+    void withdraw(std::uint64_t) override {}
+
+  private:
+    int& changes_;
+};
+
+} // namespace
+
+BOOST_AUTO_TEST_CASE(jobs_that_arrive_together_are_reported_together) {
+    constexpr int count = 60;
+    int changes = 0;
+    pooled_node node{{.workers = 1}};
+    node.pool->dispatcher()->share(std::make_unique<counting_sharing>(changes));
+    node.add_held();
+    auto client = node.peer();
+    client.send("DELEGATE self:held id=1\n"); // holds the worker
+    node.wait_for([&] { return node.pool->load().running == 1; });
+    run_ready(node.io);
+    const auto before = changes;
+    std::string lines;
+    for (int i = 0; i < count; ++i) {
+        lines += "DELEGATE self:held id=" + std::to_string(i + 2) + "\n";
+    }
+    client.send(lines);
+    node.wait_for([&] { return node.pool->load().queued == count; });
+    node.io.poll();
+    BOOST_TEST(changes != before);
+    BOOST_TEST(changes - before < count / 4); // the pool's timer reports, too
+}
+
+BOOST_AUTO_TEST_CASE(the_pool_may_end_before_the_end_of_a_burst_is_reported) {
+    int changes = 0;
+    auto node = std::make_unique<pooled_node>(cles::runtime::pool_options{.workers = 1});
+    node->pool->dispatcher()->share(std::make_unique<counting_sharing>(changes));
+    std::array<std::string, 2> outcomes;
+    cles::detail::request_data data{.verb = cles::verb::delegate, .node = "car1", .task = "work", .parameters = {}};
+    const cles::identity somebody{
+        .transport = "tcp", .address = "tcp://127.0.0.1:1", .name = "", .uid = std::nullopt, .local = true};
+    data.peer = &somebody;
+    const auto work = std::make_shared<const cles::registration>(
+        cles::registration{.plain = [](const cles::request&, cles::json_writer& w) { w.raw("{}"); }});
+    for (auto& each : outcomes) {
+        node->pool->dispatcher()->submit(cles::request{data}, responder{std::make_shared<late_withdrawal>(each)}, work);
+    }
+    node->pool->close(5s);
+    const auto before = changes;
+    run_ready(node->io);
+    BOOST_TEST(changes == before);
+    for (const auto& each : outcomes) {
+        BOOST_TEST(!each.empty());
+    }
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_may_refuse_with_a_retry_delay, fixture) {

@@ -47,8 +47,13 @@ void work_pool::submit(order what) {
     }
     j.what = std::move(what);
     j.what.answer->on_stop(if_alive(weak_from_this(), [number](work_pool& self) { self.stop(number); }));
-    host_.later({}, [self = shared_from_this()] { self->work(); });
-    report_change();
+    if (!std::exchange(burst_end_posted_, true)) {
+        host_.later({}, [self = shared_from_this()] {
+            self->burst_end_posted_ = false;
+            self->work();
+            self->report_change();
+        });
+    }
 }
 
 // Nothing more leaves the node, above all no cancellation of what has moved.

@@ -96,6 +96,7 @@ class work_pool final : public std::enable_shared_from_this<work_pool>, private 
     std::function<void()> on_drained_;     // null: it is not being drained, or has been
     bool draining_ = false;
     bool watching_ = false;
+    bool burst_end_posted_ = false;
 };
 
 } // namespace cles::simulation

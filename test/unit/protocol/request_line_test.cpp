@@ -265,6 +265,11 @@ BOOST_AUTO_TEST_CASE(unknown_adverbs_are_ignored_however_often_they_occur) {
     BOOST_TEST(parse("PULL a:b must=1 xmust_y=1").ok);
 }
 
+BOOST_AUTO_TEST_CASE(unknown_adverbs_are_counted) {
+    BOOST_TEST(parse("PULL a:b id=1 via=c").line.unknown_adverbs == 0U);
+    BOOST_TEST(parse("PULL a:b colour=red id=1 colour=blue keep=1").line.unknown_adverbs == 3U); // `keep` is of BIND
+}
+
 BOOST_AUTO_TEST_CASE(an_unknown_adverb_that_begins_with_must_is_refused) {
     for (const std::string_view bad : {"PULL a:b must_sign=yes", "PULL a:b must_=1", "BIND a:b every=1 must_x=1"}) {
         BOOST_TEST(names(why(bad), "is not known here"), bad << " gives: " << why(bad));

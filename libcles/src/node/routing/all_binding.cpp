@@ -12,8 +12,8 @@ namespace cles::core {
 all_binding::all_binding(std::shared_ptr<request_router> by, const protocol::request_line& r, relayed_path path,
                          relayed_bindings& place, binding::terms wanted, std::shared_ptr<call> answers, time_point due)
     : deferred_request(std::move(by), std::move(answers), due), task_(r.noun.task), path_(std::move(path)), via_(r.via),
-      adverbs_(forwarded_adverbs(r, routing_->host().name, path_.requester)), may_pass_on_(r.hops != 0),
-      wants_mark_(r.wants_mark), place_(place), wanted_(wanted) {}
+      adverbs_(forwarded_adverbs(r, hops_after(r), routing_->host().name, path_.requester).text),
+      may_pass_on_(r.hops != 0), wants_mark_(r.wants_mark), place_(place), wanted_(wanted) {}
 
 bool all_binding::may_bind_at(std::string_view node) const {
     return permits(routing_->host(), path_.requester, node, verb::bind, path_.text);

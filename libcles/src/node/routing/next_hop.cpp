@@ -22,17 +22,20 @@
 namespace cles::core {
 namespace {
 
-void append_foreign(std::string& out, const protocol::request_line& r) {
-    const auto most = max_further_adverbs(r);
-    auto count = count_adverbs(out);
+void append_unknown(adverb_list& to, const protocol::request_line& r) {
+    const auto most = std::min(max_further_adverbs(r), to.count + r.unknown_adverbs);
     protocol::part_reader parts{r.text};
     parts.next(); // verb
     parts.next(); // noun
-    for (auto part = parts.next(); !part.empty() && count < most; part = parts.next()) {
+    while (to.count < most) {
+        const auto part = parts.next();
         protocol::adverb a;
+        if (part.empty()) {
+            return;
+        }
         if (protocol::split_adverb(part, a) && !protocol::is_known_adverb(a.key, r.verb)) {
-            out.append(" ").append(part);
-            ++count;
+            to.text.append(" ").append(part);
+            ++to.count;
         }
     }
 }
@@ -195,30 +198,33 @@ class node_router final : private peer_next_hop, public request_router {
 
 } // namespace
 
-std::string forwarded_adverbs(const protocol::request_line& r, std::string_view own_name, std::string_view requester) {
-    auto out = "hops=" + std::to_string(r.hops == 0 ? 0 : r.hops - 1) + " via=";
+std::uint8_t hops_after(const protocol::request_line& r) noexcept {
+    return static_cast<std::uint8_t>(r.hops == 0 ? 0 : r.hops - 1);
+}
+
+adverb_list forwarded_adverbs(const protocol::request_line& r, std::uint8_t hops, std::string_view own_name,
+                              std::string_view requester) {
+    adverb_list out{.text = "hops=" + std::to_string(hops) + " via=", .count = 2};
+    const auto add = [&](std::string_view key, std::string_view value) {
+        out.text.append(key).append(value);
+        ++out.count;
+    };
     if (!r.via.empty()) {
-        out.append(r.via).push_back(',');
+        out.text.append(r.via).push_back(',');
     }
-    out.append(own_name);
-    const bool states_requester = !requester.empty() && requester != own_name;
-    if (states_requester) {
-        out.append(" from=").append(requester);
+    out.text.append(own_name);
+    if (!requester.empty() && requester != own_name) {
+        add(" from=", requester);
     }
     if (!r.sig.empty()) {
-        out.append(" sig=").append(r.sig);
+        add(" sig=", r.sig);
     }
-    append_foreign(out, r);
+    append_unknown(out, r);
     return out;
 }
 
-std::size_t count_adverbs(std::string_view adverbs) noexcept {
-    protocol::part_reader parts{adverbs};
-    std::size_t count = 0;
-    while (!parts.next().empty()) {
-        ++count;
-    }
-    return count;
+bool has_adverbs_to_forward(const protocol::request_line& r) noexcept {
+    return !r.via.empty() || !r.sig.empty() || r.unknown_adverbs != 0;
 }
 
 // The same for each verb but BIND, which has more adverbs. docs/protocol.md states how many unknown ones that leaves.

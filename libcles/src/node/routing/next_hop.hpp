@@ -57,13 +57,19 @@ class next_hop {
     ~next_hop() = default;
 };
 
-/// The adverbs of a forwarded request, except those that are members of `outgoing_request`: `hops` less one, `via` with
-/// this node's name, the requester, its signature, and those that this version does not know.
-std::string forwarded_adverbs(const protocol::request_line& request, std::string_view own_name,
-                              std::string_view requester = {});
+struct adverb_list {
+    std::string text; ///< in wire format
+    std::size_t count = 0;
+};
 
-/// How many adverbs are in a text in wire format.
-std::size_t count_adverbs(std::string_view adverbs) noexcept;
+/// The adverbs of a forwarded request, except those that are members of `outgoing_request`: `hops`, `via` with this
+/// node's name, the requester, its signature, and those that this version does not know.
+adverb_list forwarded_adverbs(const protocol::request_line& request, std::uint8_t hops, std::string_view own_name,
+                              std::string_view requester = {});
+/// Whether it has some of its own among them. Otherwise they are the same as for an empty request.
+bool has_adverbs_to_forward(const protocol::request_line& request) noexcept;
+/// The `hops` with which it is forwarded.
+std::uint8_t hops_after(const protocol::request_line& request) noexcept;
 
 /// How many adverbs a request has room for when it is forwarded, besides the members of `outgoing_request`: those of
 /// `forwarded_adverbs`, and what is added to them.

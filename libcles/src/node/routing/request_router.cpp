@@ -85,7 +85,7 @@ void request_router::forward(const protocol::request_line& r, std::string_view r
 std::uint64_t request_router::send(const protocol::request_line& r, std::string_view requester, std::string_view node,
                                    time_point due, subrequest_outcome then, outbound::progress_function progress) {
     const auto noun = std::string{node}.append(":").append(r.noun.path);
-    const auto adverbs = forwarded_adverbs(r, node_->name, requester);
+    const auto adverbs = forwarded_adverbs(r, hops_after(r), node_->name, requester).text;
     return out_.send({.verb = r.verb, .noun = noun, .carried = r.carried(), .adverbs = adverbs, .body = r.body}, due,
                      detail::pending_ptr{new subrequest(std::move(then))}, std::move(progress), r.via);
 }
@@ -129,7 +129,8 @@ void request_router::bind(const protocol::request_line& r, std::string_view requ
     } else if (r.hops == 0) {
         c->fail(no_hops_left(r));
     } else {
-        place.bind(r.noun.target, path, forwarded_adverbs(r, node_->name, requester), wanted, r.wants_mark, c);
+        place.bind(r.noun.target, path, forwarded_adverbs(r, hops_after(r), node_->name, requester).text, wanted,
+                   r.wants_mark, c);
     }
 }
 

@@ -27,7 +27,8 @@ std::shared_ptr<call> call::begin(const std::shared_ptr<node_state>& host, task_
                                   time_point now) {
     constexpr std::size_t around = 512; // itself and its handler's part, about
     auto c = std::make_shared<call>(host, owner, std::move(wanted), memory, now);
-    if (!c->hold_more(text + c->terms_.publish_body.size() + around)) {
+    const auto* const published = c->terms_.to_publish.get();
+    if (!c->hold_more(text + (published != nullptr ? published->body.size() : 0) + around)) {
         return nullptr;
     }
     host->deadlines.arm(*c, due);
@@ -39,9 +40,9 @@ void call::done(std::string_view json) {
         return;
     }
     const auto keep = shared_from_this();
-    if (!terms_.publish_path.empty()) {
+    if (terms_.to_publish) {
         try {
-            node_->published.publish_body(terms_.publish_path, terms_.publish_body);
+            node_->published.publish_body(terms_.to_publish->path, terms_.to_publish->body);
         } catch (...) {
             auto why = after_run(describe(std::current_exception()));
             why.ran = why.ran || why.code == errc::busy; // which promises otherwise that the handler has not run

@@ -16,6 +16,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -29,6 +30,10 @@ namespace cles::core {
 /// until the handler has released it.
 class call final : public deadline, public std::enable_shared_from_this<call> {
   public:
+    struct publication {
+        std::string path;
+        std::string body;
+    };
     struct terms : protocol::carried_adverbs {
         /// Those that the request line states.
         explicit terms(const protocol::request_line& r)
@@ -39,10 +44,9 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
         std::uint64_t id;
         bool wants_reply;
         bool wants_progress;
-        bool routed = false;      ///< other nodes serve it
-        std::string grantee{};    ///< the node that has forwarded it on a valid grant of this one; empty: none
-        std::string publish_path; ///< path of a request to publish; else empty
-        std::string publish_body;
+        bool routed = false;   ///< other nodes serve it
+        std::string grantee{}; ///< the node that has forwarded it on a valid grant of this one; empty: none
+        std::unique_ptr<const publication> to_publish; ///< when the handler replies
     };
 
     /// For `begin`.
@@ -84,8 +88,8 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     [[nodiscard]] const std::string& head() const noexcept { return head_; }
 
     /// What is needed to move it to another node; null if it stays.
-    [[nodiscard]] const movable_request* movable() const noexcept { return movable_.get(); }
-    void set_movable(std::unique_ptr<const movable_request> how) { movable_ = std::move(how); }
+    [[nodiscard]] const movable_request* movable() const noexcept { return movable_ ? &*movable_ : nullptr; }
+    void set_movable(std::optional<movable_request> how) { movable_ = std::move(how); }
     /// Another node serves it from now on; or it does not after all.
     void leave_to_others() noexcept;
     void take_back() noexcept;
@@ -112,7 +116,7 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     double reported_ = 0;
     std::string head_;
     std::function<void()> on_stop_;
-    std::unique_ptr<const movable_request> movable_;
+    std::optional<movable_request> movable_;
     bool stopped_ = false;
     bool times_recorded_ = false;
 };

@@ -227,8 +227,10 @@ void task_execution::start(task_sink& to, const std::shared_ptr<memory_account>&
         wanted.grantee = protocol::last_in_via(line_.via);
     }
     if (line_.verb == verb::update) {
-        wanted.publish_path = publish_path();
-        append_compact_json(request_.body(), wanted.publish_body);
+        std::string body;
+        append_compact_json(request_.body(), body);
+        wanted.to_publish = std::make_unique<const call::publication>(
+            call::publication{.path = std::string{publish_path()}, .body = std::move(body)});
     }
     const auto c = call::begin(node_, to, std::move(wanted), memory, line_.text.size(), due_, now_);
     if (!c) {
@@ -236,7 +238,7 @@ void task_execution::start(task_sink& to, const std::shared_ptr<memory_account>&
         return;
     }
     if (node_->sharing != nullptr) {
-        c->set_movable(node_->sharing->movable(line_, *data_.peer));
+        c->set_movable(node_->sharing->movable(line_, handler_->info, *data_.peer));
     }
     to.keep(*this, c);
     started_ = true;

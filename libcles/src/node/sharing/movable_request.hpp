@@ -9,7 +9,7 @@
 #include "protocol/request_line.hpp"
 
 #include <cstddef>
-#include <memory>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,13 +18,42 @@ namespace cles::core {
 
 class reply_writer;
 
-/// What is needed to forward a request later, besides its body.
-struct movable_request {
-    std::string path;      ///< of its noun
-    std::string adverbs;   ///< as forwarded
-    std::string via;       ///< the nodes that have forwarded it
-    std::string requester; ///< in a secured fleet, whose rights apply
-    std::size_t size = 0;  ///< of its line
+/// What is needed to forward a request later, besides its body. Each job that may move has one, and few do: so it
+/// is one text, which is short for most.
+class movable_request {
+  public:
+    struct parts {
+        std::string_view path;      ///< of its noun
+        std::string_view via;       ///< the nodes that have forwarded it
+        std::string_view requester; ///< in a secured fleet, whose rights apply
+        std::string_view adverbs;   ///< as forwarded; empty: it has none of its own
+        std::size_t size = 0;       ///< of its line
+    };
+
+    explicit movable_request(const parts& of)
+        : via_at_(static_cast<std::uint32_t>(of.path.size())),
+          requester_at_(static_cast<std::uint32_t>(via_at_ + of.via.size())),
+          adverbs_at_(static_cast<std::uint32_t>(requester_at_ + of.requester.size())), size_(of.size) {
+        text_.reserve(adverbs_at_ + of.adverbs.size());
+        text_.append(of.path).append(of.via).append(of.requester).append(of.adverbs);
+    }
+
+    [[nodiscard]] std::string_view path() const noexcept { return part(0, via_at_); }
+    [[nodiscard]] std::string_view via() const noexcept { return part(via_at_, requester_at_); }
+    [[nodiscard]] std::string_view requester() const noexcept { return part(requester_at_, adverbs_at_); }
+    [[nodiscard]] std::string_view adverbs() const noexcept { return part(adverbs_at_, text_.size()); }
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+
+  private:
+    [[nodiscard]] std::string_view part(std::size_t from, std::size_t to) const noexcept {
+        return std::string_view{text_}.substr(from, to - from);
+    }
+
+    std::string text_;
+    std::uint32_t via_at_;
+    std::uint32_t requester_at_;
+    std::uint32_t adverbs_at_;
+    std::size_t size_;
 };
 
 /// What a node that shares work does with requests. An interface, so that a program that does not share does not link
@@ -35,9 +64,9 @@ class request_sharing {
     request_sharing(const request_sharing&) = delete;
     request_sharing& operator=(const request_sharing&) = delete;
 
-    /// What is needed to forward the request; null if it is not moved to other nodes.
-    [[nodiscard]] virtual std::unique_ptr<const movable_request> movable(const protocol::request_line& r,
-                                                                         const identity& peer) = 0;
+    /// What is needed to forward the request for that task; nothing if it is not moved to other nodes.
+    [[nodiscard]] virtual std::optional<movable_request> movable(const protocol::request_line& r, const task_info& task,
+                                                                 const identity& peer) = 0;
     /// Uses a slot of the grant on which the request for that task came. Returns why it cannot.
     [[nodiscard]] virtual std::optional<protocol::failure>
     use_grant(const protocol::request_line& r, const task_info& task, const identity& peer, time_point now) = 0;

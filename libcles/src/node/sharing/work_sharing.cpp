@@ -28,7 +28,7 @@ void smooth(std::optional<microseconds>& average, microseconds sample) {
 
 microseconds elapsed(time_point since, time_point now) { return std::chrono::duration_cast<microseconds>(now - since); }
 
-std::string_view task_of(const movable_request& r) { return std::string_view{r.path}.substr(0, r.path.find('/')); }
+std::string_view task_of(const movable_request& r) { return r.path().substr(0, r.path().find('/')); }
 
 template <class Write>
 std::string object(Write write) {
@@ -58,29 +58,29 @@ void work_sharing::withdraw_all() {
 // -- requests ------------------------------------------------------------------------------------------------------
 
 // A job that came on a grant stays: it moves once.
-std::unique_ptr<const movable_request> work_sharing::movable(const protocol::request_line& r, const identity& peer) {
-    const bool may = r.verb == verb::delegate && r.hops != 0 && r.grant == 0 && r.text.size() <= longest_moved;
-    const auto* task = may ? node_.tasks.find(r.verb, r.noun.task) : nullptr;
-    if (task == nullptr || task->info.local || task->info.must_be_signed) {
-        return nullptr;
+std::optional<movable_request> work_sharing::movable(const protocol::request_line& r, const task_info& task,
+                                                     const identity& peer) {
+    if (r.verb != verb::delegate || r.hops == 0 || r.grant != 0 || r.text.size() > longest_moved || task.local ||
+        task.must_be_signed) {
+        return std::nullopt;
     }
     const auto requester = requester_of(node_, peer, r);
     if (!may_forward_for(requester)) {
-        return nullptr;
+        return std::nullopt;
     }
-    auto last = r;
-    last.hops = 1; // so that it is forwarded with `hops=0`
-    auto adverbs = forwarded_adverbs(last, node_.name, requester);
-    if (count_adverbs(adverbs) == max_further_adverbs(last)) { // no room for `grant`
-        return nullptr;
+    adverb_list adverbs;
+    if (has_adverbs_to_forward(r)) {
+        adverbs = forwarded_adverbs(r, 0, node_.name, requester);
+        if (adverbs.count == max_further_adverbs(r)) { // no room for `grant`
+            return std::nullopt;
+        }
     }
     std::string scratch;
-    return std::make_unique<const movable_request>(
-        movable_request{.path = std::string{protocol::canonical_path(r.noun, scratch)},
-                        .adverbs = std::move(adverbs),
-                        .via = std::string{r.via},
-                        .requester = std::string{requester},
-                        .size = r.text.size()});
+    return movable_request{{.path = protocol::canonical_path(r.noun, scratch),
+                            .via = r.via,
+                            .requester = requester,
+                            .adverbs = adverbs.text,
+                            .size = r.text.size()}};
 }
 
 bool work_sharing::may_forward_for(std::string_view requester) {
@@ -268,8 +268,12 @@ class work_sharing::forwarding final : public job_taker {
     std::uint64_t take(std::shared_ptr<call> job, std::string_view body,
                        std::function<void(bool refused)> ended) override {
         const auto& r = *job->movable();
-        const auto noun = node_ + ":" + r.path;
-        const auto adverbs = r.adverbs + " grant=" + protocol::grant_text(grant_.number);
+        const auto noun = node_ + ":" + std::string{r.path()};
+        auto adverbs = std::string{r.adverbs()};
+        if (adverbs.empty()) {
+            adverbs = forwarded_adverbs({}, 0, by_.node_.name, r.requester()).text;
+        }
+        adverbs.append(" grant=").append(protocol::grant_text(grant_.number));
         const auto ticket = ++by_.last_ticket_;
         const auto request =
             by_.out_.send({.verb = verb::delegate,
@@ -297,9 +301,9 @@ class work_sharing::forwarding final : public job_taker {
     [[nodiscard]] bool is_suitable(const movable_request& r) {
         const auto task = task_of(r);
         const auto refused = other_.refused.find(task);
-        return r.size <= other_.longest && (refused == other_.refused.end() || refused->second <= now_) &&
-               offers(task) && !is_in_via(r.via, node_) &&
-               permits(by_.node_, r.requester, node_, verb::delegate, r.path);
+        return r.size() <= other_.longest && (refused == other_.refused.end() || refused->second <= now_) &&
+               offers(task) && !is_in_via(r.via(), node_) &&
+               permits(by_.node_, r.requester(), node_, verb::delegate, r.path());
     }
     // The first one for which there is no worker waits for half a job on average.
     [[nodiscard]] bool is_worth_it(std::size_t ahead) const noexcept {
@@ -419,7 +423,7 @@ void work_sharing::remember_refusal(const moved_job& moved, const protocol::fail
     }
     const auto& request = *moved.job->movable();
     if (why.code == errc::too_large) {
-        found->second.longest = request.size - 1;
+        found->second.longest = request.size() - 1;
         return;
     }
     const auto retry = std::chrono::milliseconds{why.retry_ms.value_or(0)};
@@ -643,7 +647,8 @@ void work_sharing::refresh_neighbours() {
     });
 }
 
-// What may change without an event here: jobs are to be reported again, a grant expires, others report their loads.
+// For what may change without an event here: jobs are to be reported again, a grant expires, others report their loads.
+// It is not put off, because this is called often: so it may come when nothing is due.
 void work_sharing::arm_timer(const shareable_queue::state& own, time_point now) {
     std::optional<time_point> next;
     if (own.excess() != 0) {
@@ -654,10 +659,12 @@ void work_sharing::arm_timer(const shareable_queue::state& own, time_point now) 
             next = std::min(*next, *expiry);
         }
     }
-    if (next) {
-        node_.deadlines.arm(*this, std::max(*next, now + std::chrono::milliseconds{1}));
-    } else {
-        node_.deadlines.disarm(*this);
+    if (!next) {
+        return;
+    }
+    const auto wanted = std::max(*next, now + std::chrono::milliseconds{1});
+    if (!armed() || wanted < due()) {
+        node_.deadlines.arm(*this, wanted);
     }
 }
 

@@ -87,8 +87,8 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     void withdraw(std::uint64_t ticket) override;
 
     // request_sharing
-    [[nodiscard]] std::unique_ptr<const movable_request> movable(const protocol::request_line& r,
-                                                                 const identity& peer) override;
+    [[nodiscard]] std::optional<movable_request> movable(const protocol::request_line& r, const task_info& task,
+                                                         const identity& peer) override;
     [[nodiscard]] std::optional<protocol::failure> use_grant(const protocol::request_line& r, const task_info& task,
                                                              const identity& peer, time_point now) override;
     [[nodiscard]] std::string grant_another(std::string_view to) override;

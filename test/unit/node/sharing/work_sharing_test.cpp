@@ -154,6 +154,20 @@ BOOST_AUTO_TEST_CASE(unknown_adverbs_and_the_path_so_far_are_forwarded) {
     BOOST_TEST(sent().text == "DELEGATE car2:work/a%20b hops=0 via=car7,car1 colour=red grant=00000000000000aa {}");
 }
 
+// Few jobs move.
+BOOST_AUTO_TEST_CASE(adverbs_are_only_kept_of_jobs_that_have_some_of_their_own) {
+    submit("DELEGATE car1:work id=1 deadline=700 progress=yes urgent=yes");
+    submit("DELEGATE car1:work id=2 via=car7");
+    submit("DELEGATE car1:work id=3 colour=red");
+    submit("DELEGATE car1:work id=4 sig=s");
+    BOOST_TEST(queue.waiting.at(0).call->movable()->adverbs().empty());
+    for (std::size_t i = 1; i < 4; ++i) {
+        BOOST_TEST(!queue.waiting.at(i).call->movable()->adverbs().empty());
+    }
+    grant(4);
+    BOOST_TEST(sent().text == "DELEGATE car2:work hops=0 via=car1 sig=s grant=00000000000000aa {}");
+}
+
 BOOST_AUTO_TEST_CASE(what_stays) {
     node.host->tasks.add(verb::delegate, "here",
                          {.info = {.local = true}, .start = [this](const cles::request&, const auto& call) {
@@ -410,6 +424,33 @@ BOOST_AUTO_TEST_CASE(waiting_jobs_are_reported_every_50_ms) {
     node.pass(50ms);
     BOOST_TEST(ways.count() == count + 1);
     queue.waiting.clear();
+    node.pass(50ms);
+    BOOST_TEST(ways.count() == count + 1);
+}
+
+BOOST_AUTO_TEST_CASE(jobs_that_come_meanwhile_neither_delay_the_next_report_nor_bring_it_forward) {
+    submit_jobs(1);
+    sharing->on_change();
+    const auto count = ways.count();
+    for (int i = 0; i < 4; ++i) {
+        node.pass(10ms);
+        submit("DELEGATE car1:work id=" + std::to_string(10 + i));
+        sharing->on_change();
+    }
+    BOOST_TEST(ways.count() == count);
+    node.pass(10ms);
+    BOOST_TEST(ways.count() == count + 1);
+    BOOST_TEST(sent().text == "PUSH car2:cles/slots {\"node\":\"car1\",\"waiting\":5}");
+}
+
+// The timer is then set for the loads of the others, which are looked at less often.
+BOOST_AUTO_TEST_CASE(the_first_job_that_waits_sets_the_timer_for_an_earlier_time) {
+    queue.figures.idle = 1;
+    sharing->on_change();
+    queue.figures.idle = 0;
+    submit_jobs(1);
+    sharing->on_change();
+    const auto count = ways.count();
     node.pass(50ms);
     BOOST_TEST(ways.count() == count + 1);
 }
@@ -818,6 +859,9 @@ BOOST_AUTO_TEST_CASE(a_job_moves_with_the_name_of_its_requester) {
     submit("DELEGATE car1:work/1 id=1");
     BOOST_TEST(granted(1) == "id=900 {\"taken\":1,\"waiting\":0}\n");
     BOOST_TEST(sent().text == "DELEGATE car2:work/1 hops=0 via=car1 from=sat1 grant=00000000000000aa {}");
+    submit("DELEGATE car1:work/2 id=2 sig=s");
+    grant(1);
+    BOOST_TEST(sent().text == "DELEGATE car2:work/2 hops=0 via=car1 from=sat1 sig=s grant=00000000000000aa {}");
 }
 
 BOOST_AUTO_TEST_CASE(jobs_stay_if_the_node_may_not_forward_for_their_requester) {
