@@ -17,6 +17,7 @@
 #include <chrono>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -40,6 +41,20 @@ struct nodes {
         feed.bind(*tower, noun, options);
         run_until(io, [&] { return feed.binds != 0; });
         BOOST_REQUIRE_MESSAGE(feed.bound, feed.code.message() << ": " << feed.words);
+    }
+    cles::feed<int> bound_feed(const cles::bind_options& options = {}) {
+        cles::feed<int> feed;
+        tower->async_bind<int>("car1:place", options,
+                               [&](boost::system::error_code, cles::feed<int> made) { feed = std::move(made); });
+        run_until(io, [&] { return feed.is_open(); });
+        return feed;
+    }
+    /// Publishes 1 to `last`, which then wait in the feeds that nobody reads.
+    void queue_up_to(int last) {
+        for (int i = 1; i <= last; ++i) {
+            car->update("place", i);
+        }
+        run_ready(io);
     }
     // A publisher with the same name and address, as after a crash.
     void restart() {
@@ -317,16 +332,10 @@ BOOST_DATA_TEST_CASE(a_feed_outlives_its_service_and_fails_with_stopped, carrier
 // More than are delivered in one function.
 BOOST_DATA_TEST_CASE(a_handler_that_waits_again_gets_all_events_also_if_it_throws, carriers, kind) {
     nodes n{kind};
-    cles::feed<int> feed;
-    n.tower->async_bind<int>("car1:place", cles::bind_options{}.keep(100),
-                             [&](boost::system::error_code, cles::feed<int> made) { feed = std::move(made); });
-    run_until(n.io, [&] { return feed.is_open(); });
-    std::vector<int> expected;
-    for (int i = 1; i <= 50; ++i) {
-        n.car->update("place", i);
-        expected.push_back(i);
-    }
-    run_ready(n.io); // they are queued
+    auto feed = n.bound_feed(cles::bind_options{}.keep(100));
+    std::vector<int> expected(50);
+    std::iota(expected.begin(), expected.end(), 1);
+    n.queue_up_to(50);
     std::vector<int> got;
     std::function<void(boost::system::error_code, const cles::feed_item<int>&)> take =
         [&](boost::system::error_code, const cles::feed_item<int>& item) {
@@ -356,14 +365,8 @@ BOOST_DATA_TEST_CASE(a_handler_that_waits_again_gets_all_events_also_if_it_throw
 
 BOOST_AUTO_TEST_CASE(one_function_delivers_several_events_that_wait) {
     nodes n{carrier::inproc};
-    cles::feed<int> slow;
-    n.tower->async_bind<int>("car1:place",
-                             [&](boost::system::error_code, cles::feed<int> made) { slow = std::move(made); });
-    run_until(n.io, [&] { return slow.is_open(); });
-    for (int i = 0; i < 48; ++i) {
-        n.car->update("place", i);
-    }
-    run_ready(n.io);
+    auto slow = n.bound_feed();
+    n.queue_up_to(48);
     int got = 0;
     std::function<void(boost::system::error_code, const cles::feed_item<int>&)> take =
         [&](boost::system::error_code, const cles::feed_item<int>&) {
@@ -384,14 +387,8 @@ BOOST_AUTO_TEST_CASE(one_function_delivers_several_events_that_wait) {
 BOOST_DATA_TEST_CASE(a_handler_may_wait_again_and_then_end_its_feed,
                      boost::unit_test::data::make({"close", "destroy", "stop", "destroy the service", "cancel"}), how) {
     nodes n{carrier::tcp4};
-    auto feed = std::make_unique<cles::feed<int>>();
-    n.tower->async_bind<int>("car1:place",
-                             [&](boost::system::error_code, cles::feed<int> made) { *feed = std::move(made); });
-    run_until(n.io, [&] { return feed->is_open(); });
-    for (int i = 1; i <= 3; ++i) {
-        n.car->update("place", i);
-    }
-    run_ready(n.io);
+    auto feed = std::make_unique<cles::feed<int>>(n.bound_feed());
+    n.queue_up_to(3);
     const std::string what = how;
     boost::asio::cancellation_signal signal;
     std::vector<boost::system::error_code> second;
@@ -423,14 +420,8 @@ BOOST_DATA_TEST_CASE(a_handler_may_wait_again_and_then_end_its_feed,
 
 BOOST_AUTO_TEST_CASE(a_handler_may_run_the_executor_until_the_next_event_comes) {
     nodes n{carrier::tcp4};
-    cles::feed<int> feed;
-    n.tower->async_bind<int>("car1:place",
-                             [&](boost::system::error_code, cles::feed<int> made) { feed = std::move(made); });
-    run_until(n.io, [&] { return feed.is_open(); });
-    for (int i = 1; i <= 3; ++i) {
-        n.car->update("place", i);
-    }
-    run_ready(n.io);
+    auto feed = n.bound_feed();
+    n.queue_up_to(3);
     std::vector<int> got;
     feed.async_next([&](boost::system::error_code, const cles::feed_item<int>& first) {
         got.push_back(first.value);
@@ -447,10 +438,7 @@ BOOST_AUTO_TEST_CASE(a_handler_may_run_the_executor_until_the_next_event_comes) 
 
 BOOST_AUTO_TEST_CASE(cancelling_a_wait_leaves_the_feed_as_it_was) {
     nodes n{carrier::tcp4};
-    cles::feed<int> feed;
-    n.tower->async_bind<int>("car1:place",
-                             [&](boost::system::error_code, cles::feed<int> made) { feed = std::move(made); });
-    run_until(n.io, [&] { return feed.is_open(); });
+    auto feed = n.bound_feed();
     std::vector<std::pair<boost::system::error_code, int>> got;
     const auto take = [&](boost::system::error_code code, const cles::feed_item<int>& item) {
         got.emplace_back(code, item.value);
