@@ -12,7 +12,6 @@
 #include <fcntl.h>
 #include <linux/audit.h>
 #include <linux/filter.h>
-#include <linux/ioprio.h>
 #include <linux/sched.h>
 #include <linux/seccomp.h>
 #include <sys/ioctl.h>
@@ -43,6 +42,9 @@ constexpr int call_fchmodat2 = 452;
 constexpr int call_setxattrat = 463;
 constexpr int call_removexattrat = 466;
 constexpr int call_file_setattr = 469;
+
+// IOPRIO_WHO_PROCESS of <linux/ioprio.h>, which is not valid C++ in linux-libc-dev 6.1.192: a parameter is named `class`.
+constexpr std::uint32_t priority_of_process = 1;
 
 constexpr std::array refused_calls {
     // other processes
@@ -136,7 +138,7 @@ void allow_for_itself(filter_code& to) {
         return filter_code{load_argument(0), jump_if(BPF_JEQ, kind, 1, 0), refuse_call} + allow_values(1, {0, self});
     };
     on_call(to, SYS_setpriority, own_priority(PRIO_PROCESS));
-    on_call(to, SYS_ioprio_set, own_priority(IOPRIO_WHO_PROCESS));
+    on_call(to, SYS_ioprio_set, own_priority(priority_of_process));
 }
 
 // The owner of a descriptor gets signals, from versions of Landlock that do not limit these.
