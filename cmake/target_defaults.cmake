@@ -1,5 +1,15 @@
 # SPDX-License-Identifier: BSL-1.0
 
+# g++ looks for garbage from 128 MB on, and touches all of a precompiled header each time. A machine with memory for a
+# gigabyte in each of its compilers saves a sixth of the time.
+cmake_host_system_information(RESULT cles_memory QUERY TOTAL_PHYSICAL_MEMORY) # in MB
+cmake_host_system_information(RESULT cles_cores QUERY NUMBER_OF_LOGICAL_CORES)
+math(EXPR cles_memory_per_core "${cles_memory} / ${cles_cores}")
+set(cles_compiler_memory)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND PROJECT_IS_TOP_LEVEL AND cles_memory_per_core GREATER_EQUAL 1900)
+    set(cles_compiler_memory --param=ggc-min-heapsize=1000000) # kB
+endif()
+
 # cles_target_defaults(target): every target of ours calls this once, after it is defined.
 function(cles_target_defaults target)
     cles_target_warnings(${target})
@@ -7,7 +17,7 @@ function(cles_target_defaults target)
 
     if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
         # One section per function, so that a program contains only what it uses.
-        target_compile_options(${target} PRIVATE -ffunction-sections -fdata-sections)
+        target_compile_options(${target} PRIVATE -ffunction-sections -fdata-sections ${cles_compiler_memory})
         # Programs contain no path of the build machine.
         target_compile_options(${target} PRIVATE "-fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=")
 
