@@ -3,6 +3,7 @@
 
 #include "support/link_pair.hpp"
 #include "support/run_until.hpp"
+#include "support/test_suite.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -69,7 +70,7 @@ extern "C" int getaddrinfo(const char* node, const char* service, const addrinfo
     return name.starts_with("nobody.") ? EAI_NONAME : real("127.0.0.1", service, hints, result);
 }
 
-BOOST_AUTO_TEST_SUITE(host_name)
+CLES_TEST_SUITE(host_name)
 
 using namespace cles::test;
 using namespace std::chrono_literals;

@@ -3,6 +3,7 @@
 
 #include "support/link_pair.hpp"
 #include "support/scripted_peer.hpp"
+#include "support/test_suite.hpp"
 
 #include <boost/test/data/monomorphic.hpp>
 #include <boost/test/data/test_case.hpp>
@@ -11,7 +12,7 @@
 #include <chrono>
 #include <string>
 
-BOOST_AUTO_TEST_SUITE(link_end)
+CLES_TEST_SUITE(link_end)
 
 using namespace cles::test;
 using namespace std::chrono_literals;

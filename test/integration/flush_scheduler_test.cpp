@@ -6,6 +6,7 @@
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
+#include "support/test_suite.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/use_future.hpp>
@@ -43,7 +44,7 @@ struct cles::converter<acting> {
     }
 };
 
-BOOST_AUTO_TEST_SUITE(flush_scheduler)
+CLES_TEST_SUITE(flush_scheduler)
 
 using namespace cles::test;
 namespace asio = boost::asio;

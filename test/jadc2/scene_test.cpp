@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jadc2/scene.hpp"
 
+#include "support/test_suite.hpp"
+
 #include <boost/test/unit_test.hpp>
 
 #include <cmath>
 
-BOOST_AUTO_TEST_SUITE(scene)
+CLES_TEST_SUITE(scene)
 
 BOOST_AUTO_TEST_CASE(a_seed_gives_the_same_film_again) {
     const jadc2::scene one{7};

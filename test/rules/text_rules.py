@@ -160,7 +160,7 @@ class Texts:
     def check_suite(self, name: str, text: str) -> None:
         """The build runs `foo_test.cpp` as the suite `foo`: cases outside it would never run."""
         opened = [(m.start(), m.group(2)) for m in
-                  re.finditer(r"^[ \t]*BOOST_(AUTO|FIXTURE)_TEST_SUITE\(\s*(\w+)", text, re.MULTILINE)]
+                  re.finditer(r"^[ \t]*(BOOST_AUTO|BOOST_FIXTURE|CLES)_TEST_SUITE\(\s*(\w+)", text, re.MULTILINE)]
         closed = [m.start() for m in re.finditer(r"^[ \t]*BOOST_AUTO_TEST_SUITE_END\(", text, re.MULTILINE)]
         cases = [m.start() for m in
                  re.finditer(r"^[ \t]*BOOST_(AUTO_TEST_CASE\w*|FIXTURE_TEST_CASE\w*|DATA_TEST_CASE\w*)\(", text, re.MULTILINE)]
@@ -200,6 +200,7 @@ GOOD = {
     "data.json": "{}\n",
     "test/unit/line_test.cpp": f"// {SPDX}\nBOOST_AUTO_TEST_SUITE(line)\nBOOST_AUTO_TEST_CASE(a) {{}}\n"
     "BOOST_AUTO_TEST_SUITE(inner)\nBOOST_AUTO_TEST_SUITE_END()\nBOOST_AUTO_TEST_SUITE_END()\n",
+    "test/unit/url_test.cpp": f"// {SPDX}\nCLES_TEST_SUITE(url)\nBOOST_AUTO_TEST_CASE(a) {{}}\nBOOST_AUTO_TEST_SUITE_END()\n",
     "README.md": "# CLES\n\n## What `it` is, and why\n\n[a](docs/b.md) [b](docs/b.md#one-two) [c](#what-it-is-and-why)\n"
     "[web](https://example.org/x) `[code](nowhere.md)`\n\n```\n[code](nowhere.md)\n# no heading\n```\n\n[r]: a.cpp\n",
     "test/fuzz/corpus/json/spaces": " {} ",

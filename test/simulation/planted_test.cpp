@@ -4,6 +4,8 @@
 #include "simulation/seeds.hpp"
 #include "simulation/world/simulate.hpp"
 
+#include "support/test_suite.hpp"
+
 #include <boost/test/unit_test.hpp>
 
 #include <array>
@@ -11,7 +13,7 @@
 
 namespace sim = cles::simulation;
 
-BOOST_AUTO_TEST_SUITE(planted)
+CLES_TEST_SUITE(planted)
 
 BOOST_AUTO_TEST_CASE(each_fault_is_found) {
     using enum sim::planted;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "config/config.hpp"
 
+#include "support/test_suite.hpp"
+
 #include <boost/test/unit_test.hpp>
 
 #include <string>
@@ -21,7 +23,7 @@ std::string refusal(const config& whole) {
 
 } // namespace
 
-BOOST_AUTO_TEST_SUITE(config)
+CLES_TEST_SUITE(config)
 
 BOOST_AUTO_TEST_CASE(the_defaults_are_valid) {
     const auto c = default_config("host", 0);

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/plugin_session.hpp"
 
+#include "support/test_suite.hpp"
+
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
 
-BOOST_AUTO_TEST_SUITE(patience)
+CLES_TEST_SUITE(patience)
 
 using namespace std::chrono_literals;
 using cles::runtime::patience_of;
