@@ -10,6 +10,10 @@
 //     livelock, no message that is sent forever;
 //   - every transition of the table below is taken.
 //
+// Each step of a process is a `d_step`, which is one transition of the search, so it takes no choice. Where a step can go on in
+// several ways, such as with any of the datagrams in flight, that is chosen first, and then comes the `rest_of_step`. A check
+// sees to it that there are as many states if each step may choose.
+//
 // The table. A statement with a comment "T" is a transition of the state machines that the code implements; the test of
 // the code reads the table from here. `holder` is a job at the holder, `helper` a grant at the helper. Statements without
 // such a comment belong to the environment: what the network, the workers and the requesters do.
@@ -59,6 +63,9 @@
 //                      have started again after it began the job
 //   NO_DEADLINE        deadlines do not pass
 
+#ifndef rest_of_step
+#define rest_of_step d_step
+#endif
 #ifdef STREAM
 #define FIFO
 #elif !defined(DATAGRAM)
@@ -107,12 +114,18 @@ int to_helper; // the set of datagrams in flight, a bit for each
 int to_holder;
 #define any_in(net) (net != 0)
 #define has(net, m) ((net >> (m)) & 1)
-#define receive(net, m) \
-    m = 0; \
-    do \
-    :: has(net, m) -> net = net & ~(1 << m); break \
-    :: (net >> m) > 1 -> m++ \
-    od
+#define receive(net, m) net = net & ~(1 << (m))
+#define one_of_four(net, m, first) \
+    :: has(net, first) -> m = first \
+    :: has(net, first + 1) -> m = first + 1 \
+    :: has(net, first + 2) -> m = first + 2 \
+    :: has(net, first + 3) -> m = first + 3
+#define any_to_helper(m) if one_of_four(to_helper, m, 0) one_of_four(to_helper, m, 4) fi
+#define any_to_holder(m) \
+    if \
+    one_of_four(to_holder, m, 0) one_of_four(to_holder, m, 4) \
+    one_of_four(to_holder, m, 8) one_of_four(to_holder, m, 12) \
+    fi
 #define clear(net) skip
 #define send(net, m) net = net | (1 << (m))
 #endif
@@ -188,8 +201,7 @@ inline begins(j) {
         to_holder = to_holder & ~(7 << REPLY(j, g, 0)); \
         if \
         :: !has(to_helper, DELEGATE(j, g)) && !is_begun(j, g) -> seen[(j) * GRANTS + g] = FRESH \
-        :: seen[(j) * GRANTS + g] >= REPLIED -> seen[(j) * GRANTS + g] = BEGUN \
-        :: else \
+        :: else -> if :: seen[(j) * GRANTS + g] >= REPLIED -> seen[(j) * GRANTS + g] = BEGUN :: else fi \
         fi \
     :: else \
     fi
@@ -209,10 +221,8 @@ inline forget_messages() {
 
 // What can make no difference any longer is set to one value, so that there are fewer states.
 inline tidy() {
-    d_step {
-        forget_messages();
-        forget_grant(0); forget_grant(1)
-    }
+    forget_messages();
+    forget_grant(0); forget_grant(1)
 }
 
 // --- The holder --------------------------------------------------------------------------------------------------------
@@ -234,10 +244,10 @@ inline withdraw(j) {
 // Cancellations, deadlines, requesters that are lost.
 active proctype requester() {
     do
-    :: atomic { all_done -> break }
+    :: all_done -> break
 #ifndef NO_DEADLINE
-    :: atomic { job[0] != done -> withdraw(0) }
-    :: atomic { job[1] != done -> withdraw(1) }
+    :: d_step { job[0] != done -> withdraw(0) }
+    :: d_step { job[1] != done -> withdraw(1) }
 #endif
 #ifdef PATIENCE
     :: true -> all_done; break // from here on nobody withdraws: the rest must answer
@@ -254,9 +264,9 @@ inline start(j) {
 active proctype holder_worker() {
 end:
     do
-    :: atomic { holder_up && at_worker == NONE && job[0] == waiting -> start(0) }
-    :: atomic { holder_up && at_worker == NONE && job[0] != waiting && job[1] == waiting -> start(1) }
-    :: atomic {
+    :: d_step { holder_up && at_worker == NONE && job[0] == waiting -> start(0) }
+    :: d_step { holder_up && at_worker == NONE && job[0] != waiting && job[1] == waiting -> start(1) }
+    :: d_step {
         at_worker != NONE ->
             if
             :: job[at_worker] == running -> job[at_worker] = done /* T holder.running --answered--> holder.done */
@@ -342,37 +352,45 @@ inline leave(j) {
     fi
 }
 
+// A message arrives.
+inline holder_receives(m) {
+    if
+    :: m < GRANT(1, 1) -> keep(0, m + 1)
+    :: m >= GRANT(1, 1) && m < REPLY(0, 0, 0) -> keep(1, m - GRANT(1, 1) + 1)
+    :: m >= REPLY(0, 0, 0) && m < REPLY(0, 1, 0) -> reply(0, 0, m - REPLY(0, 0, 0))
+    :: m >= REPLY(0, 1, 0) && m < REPLY(1, 0, 0) -> reply(0, 1, m - REPLY(0, 1, 0))
+    :: m >= REPLY(1, 0, 0) && m < REPLY(1, 1, 0) -> reply(1, 0, m - REPLY(1, 0, 0))
+    :: m >= REPLY(1, 1, 0) && m < LEAVING -> reply(1, 1, m - REPLY(1, 1, 0))
+#ifdef FIFO
+    :: m == LEAVING -> holder_link = false; broken = true; leave(0); leave(1); clear(to_holder)
+#endif
+    fi;
+    m = 0;
+    tidy()
+}
+
 active proctype holder_net() {
     byte m;
 end:
     do
-    :: atomic {
-        any_in(to_holder) && holder_link && holder_up ->
-            receive(to_holder, m);
-            if
-            :: m < GRANT(1, 1) -> keep(0, m + 1)
-            :: m >= GRANT(1, 1) && m < REPLY(0, 0, 0) -> keep(1, m - GRANT(1, 1) + 1)
-            :: m >= REPLY(0, 0, 0) && m < REPLY(0, 1, 0) -> reply(0, 0, m - REPLY(0, 0, 0))
-            :: m >= REPLY(0, 1, 0) && m < REPLY(1, 0, 0) -> reply(0, 1, m - REPLY(0, 1, 0))
-            :: m >= REPLY(1, 0, 0) && m < REPLY(1, 1, 0) -> reply(1, 0, m - REPLY(1, 0, 0))
-            :: m >= REPLY(1, 1, 0) && m < LEAVING -> reply(1, 1, m - REPLY(1, 1, 0))
 #ifdef FIFO
-            :: m == LEAVING -> holder_link = false; broken = true; leave(0); leave(1); clear(to_holder)
-#endif
-            fi;
-            m = 0;
-            tidy()
+    :: d_step { any_in(to_holder) && holder_link && holder_up -> receive(to_holder, m); holder_receives(m) }
+#else
+    :: atomic { any_in(to_holder) && holder_link && holder_up ->
+            any_to_holder(m);
+            rest_of_step { receive(to_holder, m); holder_receives(m) }
         }
+#endif
     // Forwards any of the jobs that wait, as far as slots are granted; the grant expires.
-    :: atomic { holder_link && held != NONE && job[0] == waiting -> move(0) }
-    :: atomic { holder_link && held != NONE && job[1] == waiting -> move(1) }
-    :: atomic { held != NONE -> drop_grant(); tidy() }
-    :: atomic { holder_link && job[0] == moved && !sent[0] -> write(0) }
-    :: atomic { holder_link && job[1] == moved && !sent[1] -> write(1) }
+    :: d_step { holder_link && held != NONE && job[0] == waiting -> move(0) }
+    :: d_step { holder_link && held != NONE && job[1] == waiting -> move(1) }
+    :: d_step { held != NONE -> drop_grant(); tidy() }
+    :: d_step { holder_link && job[0] == moved && !sent[0] -> write(0) }
+    :: d_step { holder_link && job[1] == moved && !sent[1] -> write(1) }
     // The helper learns that jobs wait here.
-    :: atomic { holder_link && helper_link && some_wait && !news && !broken -> news = true }
+    :: d_step { holder_link && helper_link && some_wait && !news && !broken -> news = true }
     // The link or the node is lost.
-    :: atomic {
+    :: d_step {
         broken && holder_link && holder_up ->
             holder_link = false;
             clear(to_holder);
@@ -382,18 +400,18 @@ end:
         }
 #ifdef FIFO
     // A new link.
-    :: atomic {
+    :: d_step {
         broken && !holder_link && !helper_link && holder_up && helper_up ->
             broken = false; holder_link = true; helper_link = true
         }
 #else
     // A datagram of the helper arrives after its loss, or instead of it.
-    :: atomic { broken && holder_up && helper_up -> broken = false; holder_link = true; helper_link = true }
+    :: d_step { broken && holder_up && helper_up -> broken = false; holder_link = true; helper_link = true }
     // Lost, or nobody is there to receive it.
-    :: atomic { any_in(to_holder) -> receive(to_holder, m); m = 0; tidy() }
+    :: atomic { any_in(to_holder) -> any_to_holder(m); rest_of_step { receive(to_holder, m); m = 0; tidy() } }
     // Retransmission.
-    :: atomic { holder_link && job[0] == moved && sent[0] && !has(to_helper, DELEGATE(0, by[0])) -> write(0) }
-    :: atomic { holder_link && job[1] == moved && sent[1] && !has(to_helper, DELEGATE(1, by[1])) -> write(1) }
+    :: d_step { holder_link && job[0] == moved && sent[0] && !has(to_helper, DELEGATE(0, by[0])) -> write(0) }
+    :: d_step { holder_link && job[1] == moved && sent[1] && !has(to_helper, DELEGATE(1, by[1])) -> write(1) }
 #endif
     od
 }
@@ -499,30 +517,38 @@ inline lose_here(j) {
 #define may_offer (helper_link && news && !draining && !some_open && own != waiting && busy_workers < WORKERS)
 #define is_free(g) (grant[g] == none && !occurs(g))
 
+// A message arrives.
+inline helper_receives(m) {
+    if
+    :: m == DELEGATE(0, 0) -> delegate(0, 0)
+    :: m == DELEGATE(0, 1) -> delegate(0, 1)
+    :: m == DELEGATE(1, 0) -> delegate(1, 0)
+    :: m == DELEGATE(1, 1) -> delegate(1, 1)
+    :: m == CANCEL(0) -> withdraw_here(0)
+    :: m == CANCEL(1) -> withdraw_here(1)
+    :: m == TAKEN(0) -> settle(0)
+    :: m == TAKEN(1) -> settle(1)
+    fi;
+    m = 0;
+    tidy()
+}
+
 active proctype helper_net() {
     byte m;
 end:
     do
-    :: atomic {
-        any_in(to_helper) && helper_link && helper_up ->
-            receive(to_helper, m);
-            if
-            :: m == DELEGATE(0, 0) -> delegate(0, 0)
-            :: m == DELEGATE(0, 1) -> delegate(0, 1)
-            :: m == DELEGATE(1, 0) -> delegate(1, 0)
-            :: m == DELEGATE(1, 1) -> delegate(1, 1)
-            :: m == CANCEL(0) -> withdraw_here(0)
-            :: m == CANCEL(1) -> withdraw_here(1)
-            :: m == TAKEN(0) -> settle(0)
-            :: m == TAKEN(1) -> settle(1)
-            fi;
-            m = 0;
-            tidy()
+#ifdef FIFO
+    :: d_step { any_in(to_helper) && helper_link && helper_up -> receive(to_helper, m); helper_receives(m) }
+#else
+    :: atomic { any_in(to_helper) && helper_link && helper_up ->
+            any_to_helper(m);
+            rest_of_step { receive(to_helper, m); helper_receives(m) }
         }
-    :: atomic { may_offer && is_free(0) -> offer(0) }
-    :: atomic { may_offer && !is_free(0) && is_free(1) -> offer(1) }
-    :: atomic { some_open -> close_grants(); tidy() }
-    :: atomic {
+#endif
+    :: d_step { may_offer && is_free(0) -> offer(0) }
+    :: d_step { may_offer && !is_free(0) && is_free(1) -> offer(1) }
+    :: d_step { some_open -> close_grants(); tidy() }
+    :: d_step {
         broken && helper_link && helper_up ->
             helper_link = false;
             news = false;
@@ -533,7 +559,7 @@ end:
             tidy()
         }
 #ifndef FIFO
-    :: atomic { any_in(to_helper) -> receive(to_helper, m); m = 0; tidy() }
+    :: atomic { any_in(to_helper) -> any_to_helper(m); rest_of_step { receive(to_helper, m); m = 0; tidy() } }
 #endif
     od
 }
@@ -542,27 +568,30 @@ inline serve_own() {
     if :: own == waiting && busy_workers < WORKERS -> own = running :: else fi
 }
 
-inline finish(j) {
+inline finish(j, k) {
     if
-    :: at_helper[j] == running -> answer(j, with[j], OUTCOME)
-#ifdef FAILURE_REFUSES
-    :: at_helper[j] == running -> answer(j, with[j], BUSY)
-#endif
+    :: at_helper[j] == running -> answer(j, with[j], k)
     :: else
     fi;
     at_helper[j] = idle;
-    with[j] = 0
+    with[j] = 0;
+    serve_own();
+    tidy()
 }
 
 active proctype helper_worker() {
 end:
     do
-    :: atomic { own == running -> own = done }
-    :: atomic { at_helper[0] != idle -> finish(0); serve_own(); tidy() }
-    :: atomic { at_helper[1] != idle -> finish(1); serve_own(); tidy() }
+    :: d_step { own == running -> own = done }
+    :: d_step { at_helper[0] != idle -> finish(0, OUTCOME) }
+    :: d_step { at_helper[1] != idle -> finish(1, OUTCOME) }
+#ifdef FAILURE_REFUSES
+    :: d_step { at_helper[0] == running -> finish(0, BUSY) }
+    :: d_step { at_helper[1] == running -> finish(1, BUSY) }
+#endif
     // The deadline of the job passes here.
-    :: atomic { at_helper[0] == running -> withdraw_here(0); tidy() }
-    :: atomic { at_helper[1] == running -> withdraw_here(1); tidy() }
+    :: d_step { at_helper[0] == running -> withdraw_here(0); tidy() }
+    :: d_step { at_helper[1] == running -> withdraw_here(1); tidy() }
     od
 }
 
@@ -600,48 +629,46 @@ inline stop_here(j) {
 }
 
 inline helper_ends() {
-    d_step {
-        helper_up = false;
-        helper_link = false;
-        broken = true;
-        news = false;
-        at_helper[0] = idle; at_helper[1] = idle;
-        with[0] = 0; with[1] = 0;
-        if :: own != none -> own = done :: else fi;
-        grant[0] = none; grant[1] = none;
-        slots = 0;
+    helper_up = false;
+    helper_link = false;
+    broken = true;
+    news = false;
+    at_helper[0] = idle; at_helper[1] = idle;
+    with[0] = 0; with[1] = 0;
+    if :: own != none -> own = done :: else fi;
+    grant[0] = none; grant[1] = none;
+    slots = 0;
 #ifndef FIFO
-        seen[0] = FRESH; seen[1] = FRESH; seen[2] = FRESH; seen[3] = FRESH;
+    seen[0] = FRESH; seen[1] = FRESH; seen[2] = FRESH; seen[3] = FRESH;
 #endif
-        clear(to_helper)
-    }
+    clear(to_helper)
 }
 
 active proctype environment() {
     byte breaks = BREAKS, crashes = CRASHES, stops = STOPS;
 end:
     do
-    :: atomic { own == none && helper_up -> own = waiting; serve_own() }
-    :: atomic { breaks > 0 && !broken -> breaks--; broken = true }
+    :: d_step { own == none && helper_up -> own = waiting; serve_own() }
+    :: d_step { breaks > 0 && !broken -> breaks--; broken = true }
     // Whoever waits for a job at the holder learns of its loss, and takes it for answered.
-    :: atomic { crashes > 0 && holder_up && !all_done ->
+    :: d_step { crashes > 0 && holder_up && !all_done ->
             crashes--;
             job[0] = done; job[1] = done;
             forget_move(0); forget_move(1);
             holder_ends();
             tidy()
         }
-    :: atomic { crashes > 0 && helper_up -> crashes--; helper_ends(); tidy() }
-    :: atomic { !helper_up && !draining -> helper_up = true }
-    :: atomic { stops > 0 && holder_up && !all_done ->
+    :: d_step { crashes > 0 && helper_up -> crashes--; helper_ends(); tidy() }
+    :: d_step { !helper_up && !draining -> helper_up = true }
+    :: d_step { stops > 0 && holder_up && !all_done ->
             stops--;
             stop(0);
             stop(1);
             holder_ends();
             tidy()
         }
-    :: atomic { stops > 0 && helper_up && !draining -> stops--; draining = true; close_grants(); tidy() }
-    :: atomic { draining && helper_up ->
+    :: d_step { stops > 0 && helper_up && !draining -> stops--; draining = true; close_grants(); tidy() }
+    :: d_step { draining && helper_up ->
             stop_here(0);
             stop_here(1);
 #ifdef FIFO
