@@ -7,6 +7,7 @@
 The samples come from quick runs on a busy machine: for their form, not for their values.
 """
 
+import functools
 import json
 import os
 import re
@@ -82,9 +83,9 @@ def evaluate(*arguments, path=None):
 class Folder:
     """A folder with samples, and what else a test adds."""
 
-    def __init__(self, test, **more):
+    def __init__(self, add_cleanup, **more):
         holder = tempfile.TemporaryDirectory(prefix="cles-report-")
-        test.addCleanup(holder.cleanup)
+        add_cleanup(holder.cleanup)
         self.path = Path(holder.name)
         self.raw, self.out = self.path / "raw", self.path / "out"
         shutil.copytree(SAMPLES, self.raw)
@@ -96,20 +97,33 @@ class Folder:
         return (self.out / "index.html").read_text(encoding="utf-8")
 
 
+@functools.cache
+def usual():
+    """The page of the samples with figures of the common form and rows, which several tests read: its text, its root, and
+    {name of a picture: its file}."""
+    folder = Folder(unittest.addModuleCleanup, latency=FIGURE_FORM, peers=ROWS)
+    (folder.path / "pictures").mkdir()
+    done = evaluate("--from", folder.raw, "-o", folder.out, "--pictures", folder.path / "pictures")
+    assert done.returncode == 0, done.stderr
+    text = folder.page()
+    return text, ElementTree.fromstring(text), {path.name: path.read_text(encoding="utf-8")
+                                                for path in (folder.path / "pictures").iterdir()}
+
+
 def words(element):
     return " ".join("".join(element.itertext()).split())
 
 
 class Page(unittest.TestCase):
     def made(self, *arguments, code=0, path=None, **more):
-        folder = Folder(self, **more)
+        folder = Folder(self.addCleanup, **more)
         done = evaluate("--from", folder.raw, "-o", folder.out, *arguments, path=path)
         self.assertEqual(done.returncode, code, done.stderr)
         text = folder.page()
         return text, ElementTree.fromstring(text), done
 
     def test_it_is_well_formed_and_refers_to_nothing_outside(self):
-        text, root, _ = self.made(latency=FIGURE_FORM, peers=ROWS)
+        text, root, _ = usual()
         identifiers = [each.get("id") for each in root.iter() if each.get("id")]
         self.assertEqual(len(identifiers), len(set(identifiers)))
         for each in root.iter():
@@ -131,7 +145,7 @@ class Page(unittest.TestCase):
         raws = {"latency": FIGURE_FORM}
         for name in ("bench", "dsgd"):
             raws[name] = json.loads((SAMPLES / f"{name}.json").read_text(encoding="utf-8"))
-        _, root, _ = self.made(latency=FIGURE_FORM)
+        _, root, _ = usual()
         rows = {}
         for row in root.iter("{http://www.w3.org/1999/xhtml}tr"):
             rows.setdefault(row[0].text or words(row[0]), []).append(words(row))
@@ -183,11 +197,7 @@ class Page(unittest.TestCase):
 @unittest.skipUnless(shutil.which("gnuplot"), "no gnuplot")
 class Pictures(unittest.TestCase):
     def test_each_is_drawn(self):
-        folder = Folder(self, latency=FIGURE_FORM)
-        (folder.path / "pictures").mkdir()
-        done = evaluate("--from", folder.raw, "-o", folder.out, "--pictures", folder.path / "pictures")
-        self.assertEqual(done.returncode, 0, done.stderr)
-        root = ElementTree.fromstring(folder.page())
+        _, root, files = usual()
         drawn, missing = {}, {}
         for figure in root.iter("{http://www.w3.org/1999/xhtml}figure"):
             name = figure.get("id").removeprefix("picture-")
@@ -200,14 +210,13 @@ class Pictures(unittest.TestCase):
                                                 "latency_own", "latency_values", "latency_error_1", "latency_speeds"]))
         self.assertTrue(all(paths > 10 for name, paths in drawn.items() if name != "latency_own"), drawn)
         self.assertEqual(sorted(missing), ["latency_broken", "latency_odd"])
-        self.assertEqual(sorted(path.name for path in (folder.path / "pictures").iterdir()), ["latency.svg"])
-        for name in ("latency",):
-            svg = (folder.path / "pictures" / f"{name}.svg").read_text(encoding="utf-8")
+        self.assertEqual(sorted(files), ["latency.svg"])
+        for svg in files.values():
             self.assertTrue(ElementTree.fromstring(svg).tag.endswith("svg"))
             self.assertNotRegex(svg, r"[ \t]\n|\n\n")
 
     def test_those_of_links_strikes_and_peers(self):
-        folder = Folder(self, latency=across_links(), strike_latency=strike(), peers=peers())
+        folder = Folder(self.addCleanup, latency=across_links(), strike_latency=strike(), peers=peers())
         self.assertEqual(evaluate("--from", folder.raw, "-o", folder.out).returncode, 0)
         root = ElementTree.fromstring(folder.page())
         shown = {each.get("id"): words(each) for each in root.iter("{http://www.w3.org/1999/xhtml}figure")}
@@ -225,7 +234,7 @@ class Pictures(unittest.TestCase):
         sample = json.loads((SAMPLES / "dsgd.json").read_text(encoding="utf-8"))
         sample["pictured"] = {"of": 4, "box": 1, "classifier": {"weights": [0.1, 0.1], "bias": 0.5},
                               "some": [[-2, -2, 0], [2, 2, 1], [-1, -3, 1]], "near": [[-0.5, -0.5, 0], [0.5, 0.5, 1]]}
-        folder = Folder(self, dsgd=sample)
+        folder = Folder(self.addCleanup, dsgd=sample)
         self.assertEqual(evaluate("--from", folder.raw, "-o", folder.out).returncode, 0)
         root = ElementTree.fromstring(folder.page())
         shown = {each.get("id"): words(each) for each in root.iter("{http://www.w3.org/1999/xhtml}figure")}
@@ -233,9 +242,7 @@ class Pictures(unittest.TestCase):
         self.assertIn("2 points, 0 of them on the wrong side", shown["picture-data_set_zoomed"])
 
     def test_they_say_what_they_show(self):
-        folder = Folder(self)
-        self.assertEqual(evaluate("--from", folder.raw, "-o", folder.out).returncode, 0)
-        root = ElementTree.fromstring(folder.page())
+        _, root, _ = usual()
         shown = {each.get("id"): words(each) for each in root.iter("{http://www.w3.org/1999/xhtml}figure")}
         self.assertIn("CLES over a Unix socket", shown["picture-latency"])
         self.assertIn("1 MiB", shown["picture-parse"])

@@ -51,6 +51,9 @@ if "--help" not in sys.argv:
 """
 
 
+WATCHED = "seconds=1.0"  # for so long, other work is looked for first; here that would be most of the time
+
+
 def is_alive(process):
     try:
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] not in "ZX"
@@ -71,7 +74,10 @@ class Tree:
         (self.root / "scripts").mkdir()
         shutil.copy(ROOT / "scripts" / "evaluate", self.root / "scripts" / "evaluate")
         shutil.copytree(ROOT / "perf" / "report", self.root / "perf" / "report", ignore=shutil.ignore_patterns("__pycache__"))
-        shutil.copy(ROOT / "perf" / "evaluation" / "provenance.py", self.root / "perf" / "evaluation")
+        provenance = (ROOT / "perf" / "evaluation" / "provenance.py").read_text(encoding="utf-8")
+        test.assertEqual(provenance.count(WATCHED), 1)
+        (self.root / "perf" / "evaluation" / "provenance.py").write_text(provenance.replace(WATCHED, "seconds=0.02"),
+                                                                         encoding="utf-8")
         for name, text in scripts.items():
             path = self.script(name)
             path.write_text(text, encoding="utf-8")
