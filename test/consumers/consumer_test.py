@@ -4,7 +4,8 @@
 
     consumer_test.py WAY --cmake CMAKE --compiler CXX --source ROOT --build BUILD --scratch FOLDER --version VERSION
 
-WAY: install, find_package, find_security, pkg_config or add_subdirectory. FOLDER is emptied first.
+WAY: install, find_package, find_security, pkg_config or add_subdirectory. FOLDER is emptied first. Beside it are those of
+the other ways: `install` leaves the library installed for all but the last, `find_package` its objects for `pkg_config`.
 """
 
 import argparse
@@ -16,13 +17,20 @@ import sys
 from pathlib import Path
 from urllib.parse import unquote
 
+from compilation import Compilation, compilations_in
 from foreign_project import ForeignProject, expect
 
 HERE = Path(__file__).resolve().parent
 LINK = re.compile(r"\]\(([^)\s#]+)(?:#[^)\s]*)?\)")
+# What the library adds in some kinds of build, and what only our own code is held to.
+OURS = ("-Os", "-D_GLIBCXX_ASSERTIONS", "-Werror")
 
 
 class Consumer(ForeignProject):
+    @property
+    def installed(self) -> Path:
+        return self.scratch.parent / "install" / "prefix"
+
     def configure(self, folder: str, *settings: str) -> Path:
         build = self.scratch / "build"
         launcher = shutil.which("ccache")
@@ -32,12 +40,33 @@ class Consumer(ForeignProject):
                  f"-DCMAKE_CXX_COMPILER={self.options.compiler}", *settings)
         return build
 
+    def objects(self, build: Path) -> dict[str, Compilation]:
+        return compilations_in(self.run(setting(build, "CMAKE_MAKE_PROGRAM"), "-C", build, "-t", "compdb"))
+
+    def pkg_config(self, package: str, *options: str) -> list[str]:
+        places = {"PKG_CONFIG_PATH": str(next(self.installed.rglob(f"{package}.pc")).parent)}
+        return self.run("pkg-config", *options, package, environment=places).split()
+
+    def check_flags(self, flags: list[str], like: Compilation) -> None:
+        """pkg-config has a source compiled as the package of CMake does. So one object shows that both work."""
+        told = Compilation(like.source, tuple(flags))
+        expect((told.definitions, told.folders) == (like.definitions, like.folders),
+               f"pkg-config defines {told.definitions} and has headers in {told.folders}, CMake's package "
+               f"{like.definitions} and {like.folders}")
+
     def check(self, program: Path) -> None:
         printed = self.run(program)
         wanted = f'{self.options.version} 48 {{"lat":48.137154,"lon":11.576124}}\n'
         expect(printed == wanted, f"it printed {printed!r}, not {wanted!r}")
         needed = self.run("ldd", program)
         expect("boost" not in needed, f"it depends on Boost at run time:\n{needed}")
+
+
+def setting(build: Path, name: str) -> str:
+    """The value of a variable in the cache of a build."""
+    found = re.search(f"^{name}:\\w+=(.*)$", (build / "CMakeCache.txt").read_text(encoding="utf-8"), re.MULTILINE)
+    expect(found is not None, f"{name} is not in the cache of {build}")
+    return found[1]
 
 
 def check_links(pages: Path) -> int:
@@ -92,6 +121,7 @@ def has_security(prefix: Path) -> bool:
 
 def install(consumer: Consumer) -> None:
     prefix = consumer.install()
+    expect(prefix == consumer.installed, f"the others look in {consumer.installed}")
     check_case_studies(consumer, prefix)
     source = consumer.options.source
     for public in (source / "libcles" / "include").rglob("*.hpp"):
@@ -124,8 +154,7 @@ def install(consumer: Consumer) -> None:
 
 
 def find_package(consumer: Consumer) -> None:
-    prefix = consumer.install()
-    build = consumer.configure("find_package", f"-DCMAKE_PREFIX_PATH={prefix}",
+    build = consumer.configure("find_package", f"-DCMAKE_PREFIX_PATH={consumer.installed}",
                                f"-DEXPECTED_VERSION={consumer.options.version}")
     consumer.run(consumer.options.cmake, "--build", build)
     consumer.check(build / "my_program")
@@ -136,48 +165,75 @@ def find_package(consumer: Consumer) -> None:
 
 
 def find_security(consumer: Consumer) -> None:
-    prefix = consumer.install()
-    build = consumer.configure("find_security", f"-DCMAKE_PREFIX_PATH={prefix}")
+    build = consumer.configure("find_security", f"-DCMAKE_PREFIX_PATH={consumer.installed}")
     consumer.run(consumer.options.cmake, "--build", build)
 
-    places = {"PKG_CONFIG_PATH": str(next(prefix.rglob("cles-tls.pc")).parent)}
-    flags = consumer.run("pkg-config", "--cflags", "--libs", "cles-tls", environment=places).split()
+    ((made, how),) = consumer.objects(build).items()
+    consumer.check_flags(consumer.pkg_config("cles-tls", "--cflags"), how)
     program = consumer.scratch / "my_program"
-    consumer.run(consumer.options.compiler, "-std=c++20", HERE / "secured.cpp", "-o", program, *flags)
+    consumer.run(consumer.options.compiler, build / made, "-o", program, *consumer.pkg_config("cles-tls", "--libs"))
     for number, each in enumerate((build / "my_program", program)):
         printed = consumer.run(each, consumer.scratch / f"fleet{number}")
         expect(printed == "27.500000\n", f"it printed {printed!r}")
 
 
 def pkg_config(consumer: Consumer) -> None:
-    prefix = consumer.install()
-    places = {"PKG_CONFIG_PATH": str(next(prefix.rglob("cles.pc")).parent)}
-    version = consumer.run("pkg-config", "--modversion", "cles", environment=places).strip()
+    (version,) = consumer.pkg_config("cles", "--modversion")
     expect(version == consumer.options.version, f"pkg-config says version {version}")
-    launcher = [found] if (found := shutil.which("ccache")) else []
-    for asio_flags, separate in (((), True), (("--define-variable=asio_cflags=",), False)):
-        flags = consumer.run("pkg-config", *asio_flags, "--cflags", "--libs", "cles", environment=places).split()
+    build = consumer.scratch.parent / "find_package" / "build"
+    objects = consumer.objects(build)
+    for asio_flags, separate, name in (((), True, "my_program"),
+                                       (("--define-variable=asio_cflags=",), False, "my_header_only_program")):
+        flags = consumer.pkg_config("cles", *asio_flags, "--cflags")
         expect(("-DBOOST_ASIO_SEPARATE_COMPILATION" in flags) == separate, f"with {asio_flags} the flags are {flags}")
-        compiled = [flag for flag in flags if flag.startswith(("-I", "-D", "-isystem", "-pthread"))]
-        linked = [flag for flag in flags if flag not in compiled or flag == "-pthread"]
-        # In two steps, which ccache caches.
-        object_file = consumer.scratch / "consumer.o"
-        consumer.run(*launcher, consumer.options.compiler, "-std=c++20", "-c", HERE / "consumer.cpp", "-o", object_file,
-                     *compiled)
-        program = consumer.scratch / "my_program"
-        consumer.run(consumer.options.compiler, object_file, "-o", program, *linked)
+        (made,) = (output for output in objects if output.startswith(f"CMakeFiles/{name}.dir/"))
+        consumer.check_flags(flags, objects[made])
+        program = consumer.scratch / name
+        consumer.run(consumer.options.compiler, build / made, "-o", program, *consumer.pkg_config("cles", "--libs"))
         consumer.check(program)
+
+
+def check_library_is_ours(consumer: Consumer, build: Path) -> None:
+    """The sources of the library are compiled as in our own build, but for what the kind of build decides; so they compile
+    there as they do here, and what is linked need not be made again. One of them is compiled, by the project's own rules."""
+    ours = {output.removeprefix("libcles/"): how for output, how in
+            compilations_in((consumer.options.build / "compile_commands.json").read_text(encoding="utf-8")).items()}
+    theirs = {output.removeprefix("cles/libcles/"): how for output, how in consumer.objects(build).items()}
+    parts = ("CMakeFiles/cles.dir/", "CMakeFiles/cles_compact.dir/")
+    ours, theirs = ({output: how for output, how in each.items() if output.startswith(parts)} for each in (ours, theirs))
+    kind = setting(consumer.options.build, "CMAKE_BUILD_TYPE").upper()
+    left_out = {*OURS, *setting(consumer.options.build, f"CMAKE_CXX_FLAGS_{kind}").split()}
+    expect(ours and set(ours) == set(theirs), f"the library has the objects {sorted(theirs)} there, and {sorted(ours)} here")
+    for output, how in theirs.items():
+        expect(how.source.read_bytes() == ours[output].source.read_bytes(), f"{output} is made from something else there")
+        options = tuple(option for option in ours[output].options if option not in left_out)
+        expect(how.options == options, f"{output} is compiled with {set(how.options) - set(options)} only there, and with "
+               f"{set(options) - set(how.options)} only here")
+
+    ninja, archive = setting(build, "CMAKE_MAKE_PROGRAM"), Path("cles", "libcles", "libcles.a")
+    archived = re.findall(r"([^/\s]+\.o)(?=\s|$)", consumer.run(ninja, "-C", build, "-t", "commands", "-s", archive))
+    held = consumer.run("ar", "t", consumer.options.build / "libcles" / "libcles.a").split()
+    expect(sorted(archived) == sorted(held), f"the library is made of {sorted(archived)} there, and of {sorted(held)} here")
+    consumer.run(ninja, "-C", build, "cles/libcles/" + max(output for output in theirs if "json" in output))
+    shutil.copy(consumer.options.build / "libcles" / "libcles.a", build / archive)
 
 
 def add_subdirectory(consumer: Consumer) -> None:
     source = f"-DCLES_SOURCE_DIR={consumer.options.source}"
     # Asked for, the programs come along; only configured here.
-    consumer.configure("add_subdirectory", source, "-DCLES_BUILD_APPS=ON", "-DCLES_BUILD_PERF=ON",
-                       "-DEXPECTED_TARGETS=cles;cles_command;cles_minimal")
-    shutil.rmtree(consumer.scratch / "build")
+    build = consumer.configure("add_subdirectory", source, "-DCLES_BUILD_APPS=ON", "-DCLES_BUILD_PERF=ON",
+                               "-DEXPECTED_TARGETS=cles;cles_command;cles_minimal")
+    expect(setting(build, "CLES_UNITY") == "ON", "another project compiles each source of the library separately")
+    shutil.rmtree(build)
 
-    build = consumer.configure("add_subdirectory", source)
-    consumer.run(consumer.options.cmake, "--build", build)
+    build = consumer.configure("add_subdirectory", source, *(f"-D{name}={setting(consumer.options.build, name)}"
+                                                             for name in ("CLES_UNITY", "CMAKE_CXX_FLAGS")))
+    check_library_is_ours(consumer, build)
+    (made,) = (output for output in consumer.objects(build) if output.startswith("CMakeFiles/my_program.dir/"))
+    ninja = setting(build, "CMAKE_MAKE_PROGRAM")
+    consumer.run(ninja, "-C", build, made)
+    # Linked by the project's own command, which ninja would run after it had made the library.
+    consumer.run("sh", "-c", f"cd '{build}' && " + consumer.run(ninja, "-C", build, "-t", "commands", "-s", "my_program"))
     consumer.check(build / "my_program")
     # Installing another project does not install the library.
     consumer.run(consumer.options.cmake, "--install", build, "--prefix", consumer.scratch / "prefix")
