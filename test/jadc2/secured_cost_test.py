@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Runs the measurement of what security costs the case studies in its quick form, and checks its output.
+"""Runs the measurement of what security costs the case studies in its quick form, as `scripts/evaluate` does, and checks its
+output.
 
-    secured_cost_test.py FOLDER PROGRAMS
+    secured_cost_test.py FOLDER BUILD
 
-FOLDER holds the measurement, PROGRAMS the programs.
+FOLDER holds the measurement, BUILD the programs.
 """
 
-import json
 import os
 import signal
 import subprocess
@@ -15,18 +15,22 @@ import sys
 import tempfile
 import time
 import unittest
+from pathlib import Path
 
-FOLDER, PROGRAMS = sys.argv[1], sys.argv[2]
+FOLDER, BUILD = sys.argv[1], sys.argv[2]
+sys.path[:0] = [str(Path(__file__).parents[1] / "perf")]
+import evaluated  # noqa: E402
+import reported  # noqa: E402
+
+LIMIT_S = 100  # less than the test may take, so that what was started is ended
 
 
 class Cost(unittest.TestCase):
     def test_each_is_measured(self):
-        with tempfile.TemporaryDirectory() as files:
-            done = subprocess.run([sys.executable, "-B", f"{FOLDER}/secured_cases.py", "--quick", "--programs", PROGRAMS],
-                                  capture_output=True, text=True, check=False, env={**os.environ, "TMPDIR": files})
-            self.assertEqual(done.returncode, 0, done.stderr)
+        with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as files:
+            result, _ = evaluated.evaluated(self, "secured_cases", BUILD, folder, LIMIT_S, env={**os.environ, "TMPDIR": files})
             self.assertEqual(os.listdir(files), [])
-        result = json.loads(done.stdout)
+        reported.check(self, "secured_cases", result)
         figures = {each["name"]: each for each in result["figures"]}
         self.assertTrue(all(each["value"] > 0 and each["runs"] == 1 for each in figures.values()), figures)
         for what, kinds in (("update", ("plain", "secured")), ("strike", ("plain", "sealed", "signed"))):
@@ -40,7 +44,8 @@ class Cost(unittest.TestCase):
 
     def test_told_to_end_it_leaves_nothing(self):
         with tempfile.TemporaryDirectory() as files, \
-                subprocess.Popen([sys.executable, "-B", f"{FOLDER}/secured_cases.py", "--programs", PROGRAMS],
+                subprocess.Popen([sys.executable, "-B", f"{FOLDER}/secured_cases.py", "--programs", f"{BUILD}/apps",
+                                  "--orders", "50", "--seconds", "4"],  # of the drive before the one that it waits for
                                  stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                                  env={**os.environ, "TMPDIR": files}) as script:
             until = time.monotonic() + 60

@@ -21,8 +21,8 @@ sys.path[:0] = [str(ROOT / "perf")]
 from report import figures, sections  # noqa: E402
 
 # Section: its test.
-TESTED_ELSEWHERE = {"latency": "effort/latency_test.py", "platoon": "platoon/evaluation_test.py",
-                    "strike_latency": "jadc2/latency_test.py"}
+TESTED_ELSEWHERE = {"dsgd": "dsgd/table_test.py", "latency": "effort/latency_test.py", "platoon": "platoon/evaluation_test.py",
+                    "secured_cases": "jadc2/secured_cost_test.py", "strike_latency": "jadc2/latency_test.py"}
 LIMIT_S = 1680  # less than the timeout of this test, so that what it started is ended
 
 
@@ -47,7 +47,7 @@ class Quick(unittest.TestCase):
                 with self.subTest(section=name):
                     self.assertTrue(figures.figures_of(raws[name]) or raws[name].get("rows"), "neither a figure nor a row")
                     reported.check_ratios(self, figures.figures_of(raws[name]))
-        self.assertEqual((run["sections"]["bench"]["state"], run["sections"]["dsgd"]["state"]), ("ran", "ran"))
+        self.assertEqual(run["sections"]["bench"]["state"], "ran")
         for key in ("command", "date", "compiler", "machine"):
             self.assertTrue(run[key], key)
         names = {figure["name"] for figure in raws["bench"]["figures"]}
@@ -55,7 +55,6 @@ class Quick(unittest.TestCase):
             self.assertIn(name, names)
         text = " ".join("".join(page.itertext()).split())
         self.assertIn("PULL over a Unix socket, p99", text)
-        self.assertIn("overhead: elapsed less the longest shard's own time", text)
 
 
 if __name__ == "__main__":

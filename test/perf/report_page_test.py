@@ -104,7 +104,8 @@ def usual():
     folder = Folder(unittest.addModuleCleanup, latency=FIGURE_FORM, peers=ROWS)
     (folder.path / "pictures").mkdir()
     done = evaluate("--from", folder.raw, "-o", folder.out, "--pictures", folder.path / "pictures")
-    assert done.returncode == 0, done.stderr
+    if done.returncode != 0:
+        raise AssertionError(done.stderr)
     text = folder.page()
     return text, ElementTree.fromstring(text), {path.name: path.read_text(encoding="utf-8")
                                                 for path in (folder.path / "pictures").iterdir()}
