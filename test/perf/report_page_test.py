@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: BSL-1.0
 """The page that `scripts/evaluate` writes, from recorded JSON: whether it is complete and self-contained.
 
-    report_page_test.py ROOT
-
 The samples come from quick runs on a busy machine: for their form, not for their values.
 """
 
@@ -19,7 +17,7 @@ import unittest
 from pathlib import Path
 from xml.etree import ElementTree
 
-ROOT = Path(sys.argv[1])
+ROOT = Path(__file__).resolve().parents[2]
 SAMPLES = ROOT / "test" / "perf" / "samples"
 sys.path[:0] = [str(ROOT / "perf")]
 from report.figures import figures_of, text_of  # noqa: E402

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: BSL-1.0
 """How `scripts/evaluate` runs its sections: those that work, fail, hang, print nothing, or are missing.
 
-    report_running_test.py ROOT
-
 In a tree of its own, whose measuring scripts are a few lines each.
 """
 
@@ -16,7 +14,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-ROOT = Path(sys.argv[1])
+ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "perf")]
 from report import running  # noqa: E402
 from run_within import run_within  # noqa: E402
