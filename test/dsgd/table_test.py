@@ -29,7 +29,7 @@ ROWS = ["local_one_near", "local_one_far", "local_all_near", "local_all_far", "l
         "near_asked_by_far", "near_reduced_asked_by_far", "both_asked_by_far", "both_weighted", "both_resplit"]
 
 
-LIMIT_S = 150  # less than the test may take, so that what was started is ended
+LIMIT_S = 270  # less than the test may take, so that what was started is ended
 
 
 def use_two_cores():

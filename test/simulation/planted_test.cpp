@@ -3,7 +3,6 @@
 // within few seeds, as a violation of that rule and of no other.
 #include "simulation/seeds.hpp"
 #include "simulation/world/simulate.hpp"
-
 #include "support/test_suite.hpp"
 
 #include <boost/test/unit_test.hpp>

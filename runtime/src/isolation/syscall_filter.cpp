@@ -43,7 +43,8 @@ constexpr int call_setxattrat = 463;
 constexpr int call_removexattrat = 466;
 constexpr int call_file_setattr = 469;
 
-// IOPRIO_WHO_PROCESS of <linux/ioprio.h>, which is not valid C++ in linux-libc-dev 6.1.192: a parameter is named `class`.
+// IOPRIO_WHO_PROCESS of <linux/ioprio.h>, which is not valid C++ in linux-libc-dev 6.1.192: a parameter is named
+// `class`.
 constexpr std::uint32_t priority_of_process = 1;
 
 constexpr std::array refused_calls {

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/plugin_session.hpp"
-
 #include "support/test_suite.hpp"
 
 #include <boost/test/unit_test.hpp>
