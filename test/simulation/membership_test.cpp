@@ -3,6 +3,7 @@
 
 #include "node/membership/discovery.hpp"
 #include "node/membership/membership.hpp"
+#include "simulation/seeds.hpp"
 #include "support/manual_clock.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -125,14 +126,14 @@ class network {
 
 BOOST_AUTO_TEST_CASE(what_a_node_hears_stays_level_as_the_network_grows) {
     network small{50};
-    network large{300};
+    network large{cles::simulation::announced_nodes};
     for (auto* each : {&small, &large}) {
         each->pass(20s);
         for (const auto* m : each->living()) {
             BOOST_TEST(m->count(cles::peer_state::live) == each->living().size() - 1);
         }
     }
-    // An interval of 1 s, or 3 s; each up to a quarter shorter.
+    // An interval of 1 s, or of 10 ms for each node; each up to a quarter shorter.
     const auto of_small = small.announced_within(12s);
     BOOST_TEST(of_small >= 600U);
     BOOST_TEST(of_small <= 800U);

@@ -45,17 +45,17 @@ BOOST_AUTO_TEST_CASE(a_line_that_takes_more_hops) {
     hold(6, {.form = mesh_form::line, .nodes = 16, .cuts = 0, .crashes = 0, .hops = 15});
 }
 BOOST_AUTO_TEST_CASE(random_meshes) {
-    for (std::uint64_t seed = 1; seed <= (is_slow ? 2 : 10); ++seed) {
+    for (std::uint64_t seed = 1; seed <= mesh_seeds; ++seed) {
         hold(seed, {.nodes = 20});
     }
 }
 BOOST_AUTO_TEST_CASE(meshes_that_lose_many_links) {
-    for (std::uint64_t seed = 1; seed <= (is_slow ? 1 : 3); ++seed) {
-        hold(seed, {.nodes = 40, .cuts = 8, .crashes = 1});
+    for (std::uint64_t seed = 1; seed <= cut_mesh_seeds; ++seed) {
+        hold(seed, {.nodes = cut_mesh_nodes, .cuts = cut_mesh_cuts, .crashes = 1});
     }
 }
 BOOST_AUTO_TEST_CASE(links_that_cannot_be_opened_need_not_be_declared) {
-    for (std::uint64_t seed = 1; seed <= (is_slow ? 1 : 5); ++seed) {
+    for (std::uint64_t seed = 1; seed <= undeclared_mesh_seeds; ++seed) {
         hold(seed, {.nodes = 12, .declared = false});
     }
 }
@@ -68,14 +68,14 @@ BOOST_AUTO_TEST_CASE(a_ring_with_security) {
     hold(2, {.form = mesh_form::ring, .nodes = 8, .cuts = 1, .secured = true});
 }
 BOOST_AUTO_TEST_CASE(random_meshes_with_security) {
-    for (std::uint64_t seed = 1; seed <= (is_slow ? 1 : 4); ++seed) {
-        hold(seed, {.nodes = 20, .secured = true});
+    for (std::uint64_t seed = 1; seed <= secured_mesh_seeds; ++seed) {
+        hold(seed, {.nodes = secured_mesh_nodes, .secured = true});
     }
 }
 #endif
 
 BOOST_AUTO_TEST_CASE(a_link_that_must_not_be_is_found) { finds(planted::links_ignored, rule::links_kept); }
 BOOST_AUTO_TEST_CASE(a_node_that_forwards_nothing_is_found) { finds(planted::route_withheld, rule::routes_found); }
-BOOST_AUTO_TEST_CASE(two_hundred_nodes) { hold(1, {.nodes = is_slow ? 60U : 200U, .cuts = 1, .requests = 1000}); }
+BOOST_AUTO_TEST_CASE(two_hundred_nodes) { hold(1, {.nodes = mesh_nodes, .cuts = 1, .requests = 1000}); }
 
 BOOST_AUTO_TEST_SUITE_END()

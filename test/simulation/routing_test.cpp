@@ -19,7 +19,7 @@ using namespace cles::simulation;
 
 namespace {
 
-constexpr std::uint64_t lives = CLES_SIMULATION_IS_SLOW ? 5 : 60;
+constexpr std::uint64_t lives = routing_seeds;
 constexpr auto trouble = 60s;
 
 /// What became of the requests in all runs, which violate nothing.

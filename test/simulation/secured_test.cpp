@@ -56,8 +56,7 @@ BOOST_AUTO_TEST_CASE(whatever_is_forged_repeated_or_changed_only_members_are_ser
 }
 
 BOOST_AUTO_TEST_CASE(while_nothing_goes_wrong_requests_end_as_they_do_without_security) {
-    constexpr std::uint64_t enough = sim::is_slow ? 2 : 12;
-    for (std::uint64_t seed = 1; seed <= enough; ++seed) {
+    for (std::uint64_t seed = 1; seed <= sim::calm_seeds; ++seed) {
         auto p = calm_plan_of(seed);
         const auto plain = sim::simulate(p);
         p.secured = true;

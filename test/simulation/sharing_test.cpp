@@ -22,18 +22,18 @@ work_report hold(std::uint64_t seed, const sharing_setup& setup) {
     return r;
 }
 
-constexpr sharing_setup small{.nodes = 20, .clients = 20, .jobs = 10'000, .faults_per_minute = 24};
+constexpr sharing_setup small{.nodes = 20, .clients = 20, .jobs = jobs_of_a_small_mesh, .faults_per_minute = 24};
 
 } // namespace
 
 BOOST_AUTO_TEST_CASE(two_hundred_nodes_run_each_of_a_hundred_thousand_jobs_once_at_most) {
-    const auto r = hold(1, {.nodes = is_slow ? 60U : 200U, .jobs = is_slow ? 10'000U : 100'000U});
+    const auto r = hold(1, {.nodes = sharing_nodes, .jobs = sharing_jobs});
     BOOST_TEST(r.moved > r.jobs.asked / 20);
     BOOST_TEST(r.jobs.succeeded > r.jobs.asked / 2);
 }
 
 BOOST_AUTO_TEST_CASE(small_meshes) {
-    for (std::uint64_t seed = 1; seed <= (is_slow ? 2 : 10); ++seed) {
+    for (std::uint64_t seed = 1; seed <= sharing_seeds; ++seed) {
         BOOST_TEST(hold(seed, small).moved > 100U);
     }
 }
