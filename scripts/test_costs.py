@@ -79,7 +79,9 @@ def slowness(measured: dict[str, Cost], record: dict[str, Cost]) -> float:
 
 
 def excesses(measured: dict[str, Cost], record: dict[str, Cost], slow: float) -> dict[str, float]:
-    """The tests that cost too much, with what they may cost."""
+    """The tests that cost too much, with what they may cost. None if nothing is recorded: then these are the first costs."""
+    if not record:
+        return {}
     allowed = {name: LIMIT * max(record[name].cpu if name in record else 0, LEAST) * slow for name in measured}
     return {name: limit for name, limit in allowed.items() if measured[name].cpu > limit}
 
@@ -138,8 +140,8 @@ def check(preset: str, measured: dict[str, Cost]) -> int:
     slow = slowness(measured, record)
     over = excesses(measured, record, slow)
     total = sum(cost.cpu for cost in measured.values())
-    print(f"{preset}: {total:.0f} CPU seconds of tests; {slow:.2f} times as slow as when the costs were recorded; "
-          f"{len(over)} tests cost too much")
+    print(f"{preset}: {total:.0f} CPU seconds of tests" + (f"; {slow:.2f} times as slow as when the costs were recorded; "
+          f"{len(over)} tests cost too much" if record else "; nothing is recorded"))
     for name, limit in over.items():
         before = f"{record[name].cpu:.1f} s are recorded" if name in record else "nothing is recorded"
         print(f"  {name}: {measured[name].cpu:.1f} s, {before}, and at most {limit:.1f} s allowed")
@@ -216,6 +218,7 @@ def self_test() -> int:
         expect("the lowest of several costs counts", costs_in(results, alone)["b"] == Cost(2, 1))
     expect("costs are read", measured == {"a": (3.5, 6), "b": (4, 1), "new": (1.4 + 0.2, 7), "small": (0.1, 1)})
     expect("what costs too much is found", set(excesses(measured, record, 1)) == {"b", "new"})
+    expect("the first costs are not too much", excesses(measured, {}, 1) == {})
     expect("a slow machine may take longer", set(excesses(measured, record, 1.4)) == set())
     expect("slowness is the median", slowness({"a": Cost(6, 1), "b": Cost(2, 1), "c": Cost(19, 1)}, record) == 1.5)
     expect("slowness has a limit", slowness({"a": Cost(40, 1)}, record) == SLOWEST_MACHINE)

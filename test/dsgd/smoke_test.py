@@ -27,14 +27,20 @@ class Smoke(unittest.TestCase):
         self.assertEqual(ended, code, err)
         return json.loads(out), err
 
+    def fates(self, report):
+        return [shard["fate"] for shard in report["shards"]]
+
     def check_result(self, report, fates):
-        self.assertEqual([shard["fate"] for shard in report["shards"]], fates)
+        self.assertEqual(self.fates(report), fates)
         self.assertEqual(sum(part["points"] for part in report["parts"]), 200_000)
         self.assertLess(report["quality"]["mse"], report["quality"]["least_mse"] * 1.05)
 
     def read_until(self, manager, words):
-        while words not in (line := read_line(manager, manager.stderr)):
-            self.assertNotEqual(line, "", f"it did not say {words!r}")
+        said = ""
+        while words not in said:
+            line = read_line(manager, manager.stderr)
+            self.assertNotEqual(line, "", f"it did not say {words!r}, but {said!r}")
+            said += line
 
     def test_without_nodes(self):
         here, _ = self.told("--local", "4", "-e", "5")
@@ -63,6 +69,8 @@ class Smoke(unittest.TestCase):
         report, err = self.told(*named, "-e", "5")
         self.check_result(report, ["done"] * 4)
         self.assertEqual(([part["node"] for part in report["parts"]], err), (["sat1", "sat2"] * 2, ""))
+        anywhere, err = self.told("--at", at, "-e", "5")
+        self.assertEqual((anywhere["result"], self.fates(anywhere), err), (report["result"], ["done"] * 4, ""))
         code, out, err = minimal(at, "4", "5", "sat1", "sat2")
         self.assertEqual((code, err), (0, ""))
         self.assertEqual(json.loads(out), report["result"])
@@ -93,6 +101,8 @@ class Smoke(unittest.TestCase):
         code, out, err = minimal(at, "4", "5", "sat1", "sat3")
         self.assertEqual((code, out), (1, ""))
         self.assertRegex(err, "^cles-dsgd-minimal: bad_request: .*this node has other data")
+        self.assertEqual(run("--at", at, "-n", "sat1,sat9"),
+                         (3, "", "cles-dsgd: 'sat9' does not offer 'sgd': see cles ls --tasks\n"))
         self.assertEqual(run("--at", at, "-n", "sat3", "-k", "3"),
                          (5, "", "cles-dsgd: 3 shards of 2 points: each takes at least one\n"))
 
@@ -131,9 +141,11 @@ class Smoke(unittest.TestCase):
         code, out, err = finish(manager)
         self.assertEqual(code, 5, err)
         report = json.loads(out)
-        self.assertLessEqual({"lost", "failed", "withdrawn"}, {shard["fate"] for shard in report["shards"]})
+        self.assertLessEqual({"lost", "failed", "withdrawn"}, set(self.fates(report)))
         self.assertRegex(report["error"], r"^shard \d+: sat1: unavailable: ")
         self.assertIn(report["error"], err)
+        third.send_signal(signal.SIGCONT)
+        self.assertEqual(third.stop()[0], 0)
 
 
 if __name__ == "__main__":

@@ -21,9 +21,9 @@ PROGRAMS = sys.argv[1]
 MEMBERS = ("sat1", "strike1", "recon", "recon-camera", "mission", "operator")
 
 
-def run(*arguments, program="cles-jadc2"):
+def run(*arguments, program="cles-jadc2", typed=""):
     """Exit code, stdout, stderr."""
-    done = subprocess.run([os.path.join(PROGRAMS, program), *arguments], stdin=subprocess.DEVNULL, capture_output=True,
+    done = subprocess.run([os.path.join(PROGRAMS, program), *arguments], input=typed, capture_output=True,
                           text=True, timeout=PATIENCE, check=False, env={**clean_environment(), "CLES_MULTICAST": "off"})
     return done.returncode, done.stdout, done.stderr
 
@@ -99,7 +99,7 @@ class Story(StoryTest):
     def check_losses(self, mission, recon, satellite):
         """The satellite is lost, then recon; both come back."""
         satellite.kill()
-        mission.wait_for("trouble", "no node processes the video of recon: ")
+        mission.wait_for("trouble", "is libcles-fmv.so among the plugins of a node, and may recon-camera request it?")
         recon.stop(signal.SIGINT)
         self.assertEqual(recon.end(), 0)
         report = recon.all("report")[0]["data"]
@@ -146,6 +146,23 @@ class Story(StoryTest):
 
 
 class Usage(unittest.TestCase):
+    def test_alone_and_in_text(self):
+        at = f"tcp://127.0.0.1:{free_port()}"
+        code, out, err = run("recon", "--listen", "tcp://127.0.0.1:0", "--satellite", at, "--fps", "25", "--frames", "2")
+        self.assertEqual((code, err), (3, ""))
+        self.assertRegex(out, r"(?m) recon: 2 frames: 0 done, \d failed, \d skipped; no frames scored$")
+        mission = ("mission", "--recon", at, "--strike", at)
+        for more, typed in ((["--duration", "0.2"], ""), (["--operator"], "quit\n")):
+            code, out, err = run(*mission, *more, typed=typed)
+            self.assertEqual((code, err), (3, ""))
+            self.assertRegex(out, r"(?m)^\d\d:\d\d:\d\d\.\d{3} mission: 0 orders: 0 done, ")
+        with subprocess.Popen([os.path.join(PROGRAMS, "cles-jadc2"), *mission], stdin=subprocess.DEVNULL,
+                              stdout=subprocess.PIPE, text=True, env=clean_environment()) as process:
+            self.addCleanup(process.kill)
+            self.assertIn(" mission: no tracks: ", process.stdout.readline())
+            process.send_signal(signal.SIGINT)
+            self.assertEqual(process.wait(PATIENCE), 3)
+
     def test_wrong_usage(self):
         """And what goes wrong before anything begins."""
         with Fleet(PROGRAMS, rights={name: RIGHTS[name] for name in ("recon", "mission")}) as fleet:

@@ -5,11 +5,12 @@ of the other tests in Python of this folder, which assert more."""
 
 import json
 import os
+import signal
 import subprocess
 import tempfile
 import unittest
 
-from processes import PATIENCE, PLATOON, DriveTest, ended, environment, free_group, run, start, wait_until
+from processes import PATIENCE, PLATOON, DriveTest, children_of, ended, environment, free_group, run, start, wait_until
 from secured_test import Listener
 from two_hosts import Hosts
 
@@ -57,25 +58,32 @@ class Drives(DriveTest):
         self.assertRegex(out, r"\nv1 +2\d\.\d\d .* 1\d\.\d\d .* follow")
         self.assertRegex(out, r"(?m)^spacing   \d")
 
+    def test_a_drive_that_is_interrupted(self):
+        watcher = start("run", "--multicast", free_group(), "--vehicles", 2, start_new_session=True)
+        self.addCleanup(ended, watcher)
+        wait_until(lambda: children_of(watcher.pid), "it starts vehicles")
+        os.killpg(watcher.pid, signal.SIGINT)
+        out, err = watcher.communicate(timeout=PATIENCE)
+        self.assertEqual((watcher.returncode, err), (0, ""))
+        self.assertRegex(out, r"(?m)^gap +(unknown: the drive ended before all vehicles had started|\d+\.\d{3} m at least)$")
 
-class Alone(unittest.TestCase):
-    def test_on_a_network(self):
+    def test_a_drive_on_a_network(self):
         hosts = Hosts()
         self.addCleanup(hosts.close)
-
-        def vehicle(*arguments):
-            done = subprocess.run([*hosts.inside(hosts.near), PLATOON, "vehicle", "--multicast", "v0", *arguments],
+        for more in (["--insecure"], []):
+            done = subprocess.run([*hosts.inside(hosts.near), PLATOON, "run", "--multicast", "v0", "--vehicles", "3", "--hz",
+                                   "10", "--seconds", "3", "--leave", "1@0.6", "--join", "2@0.1", *more],
                                   stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE, check=False,
                                   env=environment())
-            return done.returncode, done.stdout, done.stderr
+            if more:
+                self.assertEqual((done.returncode, done.stderr), (0, ""))
+                self.assertRegex(done.stdout, r"(?m)^ +\d\.\d s  v1  left: ended normally$")
+            else:
+                self.assertEqual((done.returncode, done.stdout), (5, ""))
+                self.assertRegex(done.stderr, r"^cles-platoon: .*\(--insecure\)\n$")
 
-        code, out, err = vehicle("--name", "v0", "--lead", "--seconds", "1", "--report", "--insecure")
-        self.assertEqual((code, err), (0, ""))
-        self.assertGreater(json.loads(out)["sent"], 10)
-        code, out, err = vehicle("--name", "v0", "--lead")
-        self.assertEqual((code, out), (5, ""))
-        self.assertRegex(err, r"^cles-platoon: .*\(--insecure\)\n$")
 
+class Alone(unittest.TestCase):
     def test_without_others(self):
         code, out, err = run("vehicle", "--name", "v9", "--multicast", free_group())
         self.assertEqual((code, out), (3, ""))
@@ -95,12 +103,17 @@ class Alone(unittest.TestCase):
     def test_virtual_time(self):
         with tempfile.TemporaryDirectory() as folder:
             file = os.path.join(folder, "record.json")
-            code, out, err = run("simulate", "--vehicles", 3, "--hz", 10, "--seconds", 8, "--seeds", 2, "--record", file)
+            code, out, err = run("simulate", "--vehicles", 4, "--seconds", 20, "--brake-at", 100, "--seeds", 2, "--merge", "1@0.1",
+                                 "--split", "3@0.3", "--leave", "2@17", "--mute", "0@18+1", "--vanish", "1@12", "--record", file)
             self.assertEqual((code, err), (0, ""))
             with open(file, encoding="utf-8") as record:
-                self.assertEqual(len(json.load(record)["courses"]), 3)
+                found = json.load(record)
+        self.assertEqual(len(found["courses"]), 5)
+        told = [event["why"] for event in found["events"]]
+        self.assertIn("it changes into the lane behind v1", told, found["events"])
+        self.assertIn("it splits off", told)
         self.assertRegex(out, r"^seed 1 .*\nseed 2 .*\nall ")
-        code, out, err = run("tune", "--vehicles", 2, "--hz", 10, "--seconds", 1)
+        code, out, err = run("tune", "--vehicles", 2, "--hz", 10, "--brake-at", 0.5, "--seconds", 2.5)
         self.assertEqual((code, err), (0, ""))
         costs = [float(line.rpartition(" ")[2]) for line in out.splitlines()]
         self.assertRegex(out, r"^start +q1 1\.\d+, .*\n(better +q1 .*\n)*best +q1 .*\n$")
@@ -118,7 +131,9 @@ class Alone(unittest.TestCase):
                     (2, "--lags and --brakes: ", ["simulate", "--lags", "0.5", "0.2"]),
                     (2, "--hz", ["run", "--hz", "5"]),
                     (3, "by multicast, which is off", ["run", "--multicast", "off"]),
-                    (5, "cannot write /nowhere/record", ["simulate", "--vehicles", "2", "--record", "/nowhere/record"]),
+                    (5, "cannot write /nowhere/record", ["simulate", "--vehicles", "2", "--seconds", "1", "--record", "/nowhere/record"]),
+                    (5, "cannot write /nowhere/record", ["run", "--vehicles", "2", "--record", "/nowhere/record"]),
+                    (5, "cannot open the folder /nowhere", ["vehicle", "--keys", "/nowhere"]),
                     (5, f"{folder} has no keys of operator,v0,v1: ",
                      ["run", "--multicast", free_group(), "--vehicles", "2", "--keys", folder])):
                 ended_with, out, err = run(*arguments)
