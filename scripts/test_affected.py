@@ -3,7 +3,7 @@
 """Says which tests a change affects: those of which something has changed since they last passed. `scripts/test --affected`
 calls it with a folder of the build, and with the arguments for ctest, which may select some of the tests.
 
-    test_affected.py targets BUILD [ARGUMENT...]   prints what has to be built for these tests; without arguments: all
+    test_affected.py targets BUILD [ARGUMENT...]   prints what has to be built for these tests
     test_affected.py select BUILD [ARGUMENT...]    prints a pattern for `ctest -R`, or nothing if none of them is affected
     test_affected.py record BUILD                  remembers which of the selected tests passed, from BUILD/tests.xml
     test_affected.py forget BUILD                  forgets those that failed, from BUILD/tests.xml of a run without `select`
@@ -526,9 +526,6 @@ def main(arguments: list[str]) -> int:
         record(build, were_selected=command == "record")
         return 0
     if command == "targets":
-        if not rest:
-            print("all")
-            return 0
         # What is built may itself have changed.
         subprocess.run(["cmake", "--build", str(build), "--target", "build.ninja"], stdout=subprocess.DEVNULL, check=False)
     tests = tests_of(build, rest, ROOT)

@@ -6,14 +6,14 @@
     test_costs.py check PRESET RESULTS...    prints the tests that cost more than 1.5 times what is recorded; ends with 1 if
                                              there are any
     test_costs.py pattern PRESET RESULTS...  prints a pattern for `ctest -R` of these tests, which others may have disturbed
-    test_costs.py record PRESET RESULTS...   writes down in test/costs/PRESET what new tests have cost, and tests whose cost has
-                                             changed by more than that; a recorded cost rises only in a commit of its own that
-                                             says why
+    test_costs.py record PRESET RESULTS...   records in test/costs/PRESET the costs of tests that are not there, and of tests
+                                             that cost too much; a recorded cost rises only in a commit of its own that says
+                                             why
     test_costs.py history                    checks that the commits have kept this rule
     test_costs.py --self-test
 
-RESULTS is what ctest wrote as JUnit XML; of a test in several of them, the lowest cost counts. A test's cost are the CPU seconds of all its processes, as test/support/isolated
-prints them. A line of test/costs/PRESET has the name of a test, its CPU seconds, and the seconds that it took beside others;
+RESULTS is what ctest wrote as JUnit XML; of a test in several of them, the lowest cost counts. The cost of a test is the CPU time of all its processes, which test/support/isolated
+prints. A line of test/costs/PRESET has the name of a test, its CPU seconds, and the seconds that it took beside others;
 CMake schedules the tests by these (test/CMakeLists.txt). A test that is not listed may cost as much as one second.
 
 On a machine that is slower than the one of the record, everything costs more. So the costs are divided by the median of
@@ -36,6 +36,7 @@ LIMIT = 1.5  # times the recorded cost
 LEAST = 1.0  # CPU seconds: no test is recorded with less
 LEAST_WAIT = 5.0  # seconds: tests that take as long are recorded although they cost little, so that they start early
 SLOWEST_MACHINE = 2.0
+LEAST_RATIOS = 3  # of fewer tests, the median says nothing about the machine
 SHOWN = 10
 CPU_TIME = re.compile(r"cles: CPU time\n.*\n(\d+)m([\d.]+)s (\d+)m([\d.]+)s\s*\Z")
 
@@ -75,13 +76,11 @@ def recorded(preset: str) -> dict[str, Cost]:
 
 def slowness(measured: dict[str, Cost], record: dict[str, Cost]) -> float:
     ratios = [measured[name].cpu / cost.cpu for name, cost in record.items() if name in measured and cost.cpu >= 2]
-    return min(max(statistics.median(ratios), 1.0), SLOWEST_MACHINE) if ratios else 1.0
+    return min(max(statistics.median(ratios), 1.0), SLOWEST_MACHINE) if len(ratios) >= LEAST_RATIOS else 1.0
 
 
 def excesses(measured: dict[str, Cost], record: dict[str, Cost], slow: float) -> dict[str, float]:
-    """The tests that cost too much, with what they may cost. None if nothing is recorded: then these are the first costs."""
-    if not record:
-        return {}
+    """The tests that cost too much, with what they may cost."""
     allowed = {name: LIMIT * max(record[name].cpu if name in record else 0, LEAST) * slow for name in measured}
     return {name: limit for name, limit in allowed.items() if measured[name].cpu > limit}
 
@@ -140,8 +139,8 @@ def check(preset: str, measured: dict[str, Cost]) -> int:
     slow = slowness(measured, record)
     over = excesses(measured, record, slow)
     total = sum(cost.cpu for cost in measured.values())
-    print(f"{preset}: {total:.0f} CPU seconds of tests" + (f"; {slow:.2f} times as slow as when the costs were recorded; "
-          f"{len(over)} tests cost too much" if record else "; nothing is recorded"))
+    print(f"{preset}: {total:.0f} CPU seconds of tests; {slow:.2f} times as slow as when the costs were recorded; "
+          f"{len(over)} tests cost too much")
     for name, limit in over.items():
         before = f"{record[name].cpu:.1f} s are recorded" if name in record else "nothing is recorded"
         print(f"  {name}: {measured[name].cpu:.1f} s, {before}, and at most {limit:.1f} s allowed")
@@ -160,12 +159,23 @@ HEADER = """\
 
 
 def record_text(measured: dict[str, Cost], before: dict[str, Cost]) -> str:
-    """What was recorded stays unless it has changed by more than the limit."""
+    """Lower costs are not recorded: a test that compiles costs less with a warm compiler cache."""
     new = {name: cost for name, cost in measured.items() if cost.cpu > LEAST or cost.wall > LEAST_WAIT}
-    same = {name for name, cost in before.items() if name not in measured
-            or max(cost.cpu, LEAST) / LIMIT <= max(measured[name].cpu, LEAST) <= LIMIT * max(cost.cpu, LEAST)}
-    kept = {**new, **{name: before[name] for name in same}}
+    over = excesses(measured, before, slowness(measured, before))
+    kept = {**new, **{name: cost for name, cost in before.items() if name not in over}}
     return HEADER + "".join(f"{name} {cost.cpu:.1f} {cost.wall:.1f}\n" for name, cost in sorted(kept.items()))
+
+
+def write_record(preset: str, measured: dict[str, Cost]) -> int:
+    if not record_of(preset).exists():
+        print(f"test_costs.py: the costs of {preset} are not recorded, only those of "
+              f"{', '.join(sorted(path.name for path in record_of(preset).parent.iterdir()))}", file=sys.stderr)
+        return 2
+    before = record_of(preset).read_text(encoding="utf-8")
+    after = record_text(measured, read_record(before))
+    record_of(preset).write_text(after, encoding="utf-8")
+    print("\n".join(line for line in after.splitlines() if line not in before.splitlines()) or "nothing has changed")
+    return 0
 
 
 def risen(before: str, after: str) -> list[str]:
@@ -180,7 +190,8 @@ def git(*arguments: str) -> str:
 
 def history() -> int:
     wrong = []
-    for commit in git("log", "--format=%h", "--no-merges", "--", "test/costs").split():
+    # The last ones: so one mistake does not fail for ever.
+    for commit in git("log", "-n", "5", "--format=%h", "--no-merges", "--", "test/costs").split():
         changed = git("show", "--format=", "--name-only", commit).split()
         files = [name for name in changed if name.startswith("test/costs/")]
         rises = [f"{name} ({file})" for file in files
@@ -218,14 +229,14 @@ def self_test() -> int:
         expect("the lowest of several costs counts", costs_in(results, alone)["b"] == Cost(2, 1))
     expect("costs are read", measured == {"a": (3.5, 6), "b": (4, 1), "new": (1.4 + 0.2, 7), "small": (0.1, 1)})
     expect("what costs too much is found", set(excesses(measured, record, 1)) == {"b", "new"})
-    expect("the first costs are not too much", excesses(measured, {}, 1) == {})
     expect("a slow machine may take longer", set(excesses(measured, record, 1.4)) == set())
     expect("slowness is the median", slowness({"a": Cost(6, 1), "b": Cost(2, 1), "c": Cost(19, 1)}, record) == 1.5)
-    expect("slowness has a limit", slowness({"a": Cost(40, 1)}, record) == SLOWEST_MACHINE)
-    expect("a fast machine is not an excuse", slowness({"a": Cost(1, 1)}, record) == 1)
+    expect("slowness has a limit", slowness({name: Cost(40, 1) for name in record}, record) == SLOWEST_MACHINE)
+    expect("a fast machine counts as one", slowness({name: Cost(1, 1) for name in record}, record) == 1)
+    expect("one test says nothing of the machine", slowness({"a": Cost(6, 1)}, record) == 1)
     expect("no record, no slowness", slowness(measured, {}) == 1)
     expect("what is recorded is read again", read_record(record_text(measured, {})) == {"a": (3.5, 6), "b": (4, 1), "new": (1.6, 7)})
-    expect("what has hardly changed, or was not measured, stays",
+    expect("what is not above its limit, or was not measured, stays",
            read_record(record_text(measured, record)) == {"a": (4, 5), "b": (4, 1), "c": (10, 10), "new": (1.6, 7)})
     expect("a rise is found", risen(RECORD, "a 4.1 1.0\nb 1.0 9.0\nd 9.0 9.0\n") == ["a"])
     expect("targets are added up", build_costs(LOG) == {"cles": 2.0, "clesd": 0.1})
@@ -247,9 +258,7 @@ def main(arguments: list[str]) -> int:
             print(pattern(preset, costs_in(*map(Path, results))))
             return 0
         case ["record", preset, *results] if results:
-            record_of(preset).parent.mkdir(exist_ok=True)
-            record_of(preset).write_text(record_text(costs_in(*map(Path, results)), recorded(preset)), encoding="utf-8")
-            return 0
+            return write_record(preset, costs_in(*map(Path, results)))
     print(__doc__, file=sys.stderr)
     return 2
 

@@ -206,13 +206,14 @@ def main(arguments: list[str]) -> int:
     force = "--force" in arguments
     size = "full" if "--full" in arguments else "small"
     names = [argument for argument in arguments if argument not in ("--force", "--full")]
-    unknown = set(names) - {what.name for what in CHECKS}
+    offered = [what for what in CHECKS if size == "full" or what.fewer is not None]
+    unknown = set(names) - {what.name for what in offered}
     if unknown:
-        print(f"there is no check {', '.join(sorted(unknown))}")
+        print(f"there is no check {', '.join(sorted(unknown))} in the {size} configurations")
         return 2
     print(f"{'check':20} {'search':9} {'states':>11} {'MB':>8} {'s':>8}  result")
     wrong = []
-    wanted = [what for what in CHECKS if (size == "full" or what.fewer is not None) and (not names or what.name in names)]
+    wanted = [what for what in offered if not names or what.name in names]
     used = tools()
     with ThreadPoolExecutor(min(AT_ONCE[size], len(os.sched_getaffinity(0)))) as at_once:
         for row, failure in at_once.map(lambda what: check(what, size, text, used, force), wanted):

@@ -10,9 +10,9 @@
 //     livelock, no message that is sent forever;
 //   - every transition of the table below is taken.
 //
-// Each step of a process is a `d_step`, which is one transition of the search, so it takes no choice. Where a step can go on in
-// several ways, such as with any of the datagrams in flight, that is chosen first, and then comes the `rest_of_step`. A check
-// sees to it that there are as many states if each step may choose.
+// Each step of a process is a `d_step`, which is one transition of the search, so it must not contain a choice. Where a step
+// can go on in several ways, such as with any of the datagrams in flight, that is chosen first, and then comes the
+// `rest_of_step`. A check sees to it that there are as many states if each step may choose.
 //
 // The table. A statement with a comment "T" is a transition of the state machines that the code implements; the test of
 // the code reads the table from here. `holder` is a job at the holder, `helper` a grant at the helper. Statements without
