@@ -9,6 +9,7 @@
 #include <chrono>
 #include <string>
 
+namespace all_of_a_distant_pool {
 namespace {
 
 using namespace std::chrono_literals;
@@ -80,6 +81,7 @@ constexpr auto all_but_car2 =
     R"({"results":{"car3":3},"errors":{"car2":{"error":"deadline","message":"car2 did not answer in time"}}})";
 
 } // namespace
+} // namespace all_of_a_distant_pool
 
 BOOST_AUTO_TEST_SUITE(all_of_a_distant_pool)
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+namespace bridge_faults {
 namespace {
 
 using namespace std::chrono_literals;
@@ -145,6 +146,7 @@ class run {
 };
 
 } // namespace
+} // namespace bridge_faults
 
 BOOST_AUTO_TEST_SUITE(bridge_faults)
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "federation/bridge.hpp"
 #include "simulated_nats.hpp"
+#include "support/test_suite.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -10,6 +11,7 @@
 #include <string>
 #include <vector>
 
+namespace bridge_suite {
 namespace {
 
 using namespace std::chrono_literals;
@@ -42,8 +44,9 @@ bool has_words(const std::vector<std::string>& all, const std::string& words) {
 }
 
 } // namespace
+} // namespace bridge_suite
 
-BOOST_AUTO_TEST_SUITE(bridge)
+CLES_TEST_SUITE(bridge)
 
 BOOST_FIXTURE_TEST_CASE(bridges_find_each_other_and_learn_names, two_pools) {
     BOOST_TEST(hub.core().is_live("north"));

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "federation/carried_line.hpp"
+#include "support/test_suite.hpp"
 
 #include <boost/test/unit_test.hpp>
 
 #include <string>
 #include <string_view>
 
+namespace carried_line_suite {
 namespace {
 
 using namespace cles::bridging; // NOLINT(google-build-using-namespace)
@@ -19,8 +21,9 @@ cles::protocol::request_line parsed(std::string_view line) {
 }
 
 } // namespace
+} // namespace carried_line_suite
 
-BOOST_AUTO_TEST_SUITE(carried_line)
+CLES_TEST_SUITE(carried_line)
 
 BOOST_AUTO_TEST_CASE(the_message_is_the_rest_of_the_line) {
     BOOST_TEST(message_of(parsed("PULL car1:speed id=7"), "south") == "");

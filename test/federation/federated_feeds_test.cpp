@@ -26,6 +26,7 @@
 #include <string_view>
 #include <vector>
 
+namespace federated_feeds {
 namespace {
 
 namespace asio = boost::asio;
@@ -173,6 +174,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace federated_feeds
 
 BOOST_FIXTURE_TEST_SUITE(federated_feeds, fixture)
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "federation/heartbeat.hpp"
+#include "support/test_suite.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -8,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+namespace heartbeat_suite {
 namespace {
 
 using namespace cles::bridging; // NOLINT(google-build-using-namespace)
@@ -16,8 +18,9 @@ using std::chrono::milliseconds;
 const std::string digest = "0123456789abcdef";
 
 } // namespace
+} // namespace heartbeat_suite
 
-BOOST_AUTO_TEST_SUITE(heartbeat)
+CLES_TEST_SUITE(heartbeat)
 
 BOOST_AUTO_TEST_CASE(it_is_read_as_written) {
     const cles::bridging::heartbeat plain{.node = "hub", .interval = milliseconds{400}, .names = digest};

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+namespace link_backlog {
 namespace {
 
 using cles::nats::pool_link;
@@ -56,6 +57,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace link_backlog
 
 BOOST_AUTO_TEST_SUITE(link_backlog)
 

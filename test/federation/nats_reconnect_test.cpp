@@ -15,6 +15,7 @@
 #include <string_view>
 #include <utility>
 
+namespace nats_reconnect {
 namespace {
 
 namespace asio = boost::asio;
@@ -72,6 +73,7 @@ class wakes {
 };
 
 } // namespace
+} // namespace nats_reconnect
 
 BOOST_AUTO_TEST_SUITE(nats_reconnect)
 

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "federation/subject.hpp"
+#include "support/test_suite.hpp"
 
 #include <boost/test/unit_test.hpp>
 
 #include <string>
 #include <string_view>
 
+namespace subject_suite {
 namespace {
 
 using namespace cles::bridging; // NOLINT(google-build-using-namespace)
@@ -14,8 +16,9 @@ using cles::verb;
 const bridge_id gate{"north", "0123456789abcdef"};
 
 } // namespace
+} // namespace subject_suite
 
-BOOST_AUTO_TEST_SUITE(subject)
+CLES_TEST_SUITE(subject)
 
 BOOST_AUTO_TEST_CASE(a_request_names_pool_verb_node_and_task) {
     BOOST_TEST(request_subject("north", verb::pull, "car1", "speed") == "cles.north.pull.car1.speed");
