@@ -22,6 +22,7 @@
 #include <exception>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <utility>
@@ -189,9 +190,8 @@ BOOST_AUTO_TEST_CASE(of_a_pool_operations_are_begun_on_any_thread) {
     for (int i = 0; i < 8; ++i) {
         all.push_back(asio::co_spawn(pool, ask_often(tower, times), asio::use_future));
     }
-    std::atomic<bool> done = false;
-    std::thread publisher{[&] {
-        for (int i = 1; !done; ++i) {
+    std::jthread publisher{[&](const std::stop_token& done) { // ends with the test, also if that fails
+        for (int i = 1; !done.stop_requested(); ++i) {
             car.update("place", i);
         }
     }};
@@ -203,7 +203,7 @@ BOOST_AUTO_TEST_CASE(of_a_pool_operations_are_begun_on_any_thread) {
         auto pulled = tower.async_pull<int>("car1:speed", asio::use_future);
         BOOST_TEST(pulled.get() == 42);
     }
-    done = true;
+    publisher.request_stop();
     publisher.join();
     auto refused = asio::post(pool, asio::use_future([&] { // as a value: the exception is seen by one thread only
                                   try {
