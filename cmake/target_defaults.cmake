@@ -31,7 +31,8 @@ function(cles_target_defaults target)
     target_compile_definitions(${target} PRIVATE $<$<CONFIG:Debug>:_GLIBCXX_ASSERTIONS>)
 endfunction()
 
-# cles_target_runs_little(target): for programs that compute little, so that compiling them faster gains more.
+# cles_target_runs_little(target): for programs that compute little themselves (the simulation mostly runs the library), so
+# that compiling them faster gains more.
 function(cles_target_runs_little target)
     target_compile_options(${target} PRIVATE $<$<AND:$<CONFIG:Release>,$<CXX_COMPILER_ID:GNU,Clang>>:-O1>
         # With -O1, g++ 12 sees another deallocation of a coroutine's frame than Asio's.

@@ -148,7 +148,8 @@ def check(preset: str, measured: dict[str, Cost]) -> int:
 
 
 def pattern(preset: str, measured: dict[str, Cost]) -> str:
-    over = excesses(measured, recorded(preset), slowness(measured, recorded(preset)))
+    record = recorded(preset)
+    over = excesses(measured, record, slowness(measured, record))
     return "^(" + "|".join(map(re.escape, over)) + ")$" if over else ""
 
 
