@@ -14,6 +14,7 @@ import subprocess
 import sys
 import unittest
 
+import secured_test
 from jadc2_fleet import PATIENCE, RIGHTS, Fleet, Process, clean_environment, free_port
 from story import StoryTest
 
@@ -145,41 +146,10 @@ class Story(StoryTest):
         self.assertIn("the limit of streams is reached", err)
 
 
-class Usage(unittest.TestCase):
-    def test_alone_and_in_text(self):
-        at = f"tcp://127.0.0.1:{free_port()}"
-        code, out, err = run("recon", "--listen", "tcp://127.0.0.1:0", "--satellite", at, "--fps", "25", "--frames", "2")
-        self.assertEqual((code, err), (3, ""))
-        self.assertRegex(out, r"(?m) recon: 2 frames: 0 done, \d failed, \d skipped; no frames scored$")
-        mission = ("mission", "--recon", at, "--strike", at)
-        for more, typed in ((["--duration", "0.2"], ""), (["--operator"], "quit\n")):
-            code, out, err = run(*mission, *more, typed=typed)
-            self.assertEqual((code, err), (3, ""))
-            self.assertRegex(out, r"(?m)^\d\d:\d\d:\d\d\.\d{3} mission: 0 orders: 0 done, ")
-        with subprocess.Popen([os.path.join(PROGRAMS, "cles-jadc2"), *mission], stdin=subprocess.DEVNULL,
-                              stdout=subprocess.PIPE, text=True, env=clean_environment()) as process:
-            self.addCleanup(process.kill)
-            self.assertIn(" mission: no tracks: ", process.stdout.readline())
-            process.send_signal(signal.SIGINT)
-            self.assertEqual(process.wait(PATIENCE), 3)
+class Usage(secured_test.Usage):
+    """What goes wrong before anything begins; and the rehearsal."""
 
-    def test_wrong_usage(self):
-        """And what goes wrong before anything begins."""
-        with Fleet(PROGRAMS, rights={name: RIGHTS[name] for name in ("recon", "mission")}) as fleet:
-            recon, mission = fleet.keys("recon"), fleet.keys("mission")
-            at = f"tls://127.0.0.1:{free_port()}"
-            for code, said, arguments in (
-                    (2, f"--name x is not the name of the key in {mission}, which is mission",
-                     ("mission", "--keys", mission, "--name", "x")),
-                    (2, "the node for satellites has a key of its own, which is not in "
-                        f"{recon}-camera: name its directory with --camera-keys", ("recon", "--keys", f"{recon}//")),
-                    (2, "--camera-keys: needs --keys too", ("recon", "--camera-keys", recon)),
-                    (5, "cannot open the folder /nowhere: No such file or directory", ("mission", "--keys", "/nowhere")),
-                    (5, "insecure_listen: 'tcp' is refused with security: use 'tls' instead of 'tcp://127.0.0.1:0'",
-                     ("recon", "--keys", recon, "--camera-keys", mission, "--listen", "tcp://127.0.0.1:0")),
-                    (5, f"unknown_scheme: 'tls' in '{at}': it needs the key of a member: give --keys DIR, or set CLES_KEYS",
-                     ("drill", "--at", at))):
-                self.assertEqual(run(*arguments), (code, "", f"cles-jadc2: {said}\n"))
+    def test_rehearsing_nothing(self):
         code, out, err = run("rehearse", "--strikes", "0")
         self.assertEqual((code, out), (2, ""))
         self.assertNotEqual(err, "")
