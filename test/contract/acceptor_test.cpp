@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 // Incoming links while the process or the system has run out of a resource.
 
+#include "support/data_test_case.hpp"
 #include "support/link_pair.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
 
 #include <boost/asio/steady_timer.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
@@ -44,12 +44,12 @@ using namespace std::chrono_literals;
 
 namespace {
 
-const auto shortages = boost::unit_test::data::make({EMFILE, ENFILE, ENOBUFS, ENOMEM, EPERM});
+constexpr std::array shortages{EMFILE, ENFILE, ENOBUFS, ENOMEM, EPERM};
 
 } // namespace
 
 // The connection stays in the queue, so the socket remains readable.
-BOOST_DATA_TEST_CASE(it_does_not_spin_and_continues_after_the_shortage, shortages, error) {
+CLES_DATA_TEST_CASE(it_does_not_spin_and_continues_after_the_shortage, shortages, error) {
     link_pair pair{carrier::tcp4};
     attempts = 0;
     fails_with = error;

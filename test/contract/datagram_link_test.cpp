@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 
+#include "support/data_test_case.hpp"
 #include "support/link_pair.hpp"
 #include "support/link_recorder.hpp"
 #include "support/run_until.hpp"
@@ -10,8 +11,6 @@
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/ip/udp.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <array>
@@ -45,21 +44,21 @@ using lines = std::vector<std::string>;
 
 } // namespace
 
-BOOST_DATA_TEST_CASE(it_reports_the_size_of_a_datagram, every_datagram, kind) {
+CLES_DATA_TEST_CASE(it_reports_the_size_of_a_datagram, every_datagram, kind) {
     link_pair pair{kind};
     pair.connect();
     BOOST_TEST(pair.near.link->datagram() == 1200U);
     BOOST_TEST(pair.far.link->datagram() == 1200U);
 }
 
-BOOST_DATA_TEST_CASE(a_stream_reports_that_it_has_no_datagrams, every_carrier, kind) {
+CLES_DATA_TEST_CASE(a_stream_reports_that_it_has_no_datagrams, every_carrier, kind) {
     link_pair pair{kind};
     pair.connect();
     BOOST_TEST(pair.near.link->datagram() == 0U);
     BOOST_TEST(pair.far.run([&] { return pair.far.link->datagram(); }) == 0U);
 }
 
-BOOST_DATA_TEST_CASE(each_line_arrives_in_both_directions_with_a_separate_batch, every_datagram, kind) {
+CLES_DATA_TEST_CASE(each_line_arrives_in_both_directions_with_a_separate_batch, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.say("one\ntwo\n");
@@ -74,7 +73,7 @@ BOOST_DATA_TEST_CASE(each_line_arrives_in_both_directions_with_a_separate_batch,
     BOOST_TEST(pair.far.link->received() == pair.near.link->sent());
 }
 
-BOOST_DATA_TEST_CASE(the_lf_at_the_end_may_be_left_out, every_datagram, kind) {
+CLES_DATA_TEST_CASE(the_lf_at_the_end_may_be_left_out, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     plain_socket someone{pair.io, pair.address()};
@@ -85,7 +84,7 @@ BOOST_DATA_TEST_CASE(the_lf_at_the_end_may_be_left_out, every_datagram, kind) {
     BOOST_TEST(pair.far.events->lines.back() == "PULL self:cles");
 }
 
-BOOST_DATA_TEST_CASE(several_lines_in_one_datagram_are_handed_over_as_they_came, every_datagram, kind) {
+CLES_DATA_TEST_CASE(several_lines_in_one_datagram_are_handed_over_as_they_came, every_datagram, kind) {
     link_pair pair{kind};
     plain_socket someone{pair.io, pair.address()};
     someone.send("one\ntwo\n");
@@ -95,7 +94,7 @@ BOOST_DATA_TEST_CASE(several_lines_in_one_datagram_are_handed_over_as_they_came,
     BOOST_TEST(pair.far.events->lines[0] == "one\ntwo"); // the session refuses it
 }
 
-BOOST_DATA_TEST_CASE(an_empty_datagram_is_ignored_and_makes_no_link, every_datagram, kind) {
+CLES_DATA_TEST_CASE(an_empty_datagram_is_ignored_and_makes_no_link, every_datagram, kind) {
     link_pair pair{kind};
     plain_socket someone{pair.io, pair.address()};
     for (const auto* nothing : {"", "\n", "\r\n"}) {
@@ -108,7 +107,7 @@ BOOST_DATA_TEST_CASE(an_empty_datagram_is_ignored_and_makes_no_link, every_datag
     BOOST_TEST(pair.far.events->lines[0] == "x");
 }
 
-BOOST_DATA_TEST_CASE(one_over_the_limit_is_reported_and_the_link_continues, every_datagram, kind) {
+CLES_DATA_TEST_CASE(one_over_the_limit_is_reported_and_the_link_continues, every_datagram, kind) {
     link_pair pair{kind};
     plain_socket someone{pair.io, pair.address()};
     someone.send(std::string(1200, 'a'));
@@ -124,7 +123,7 @@ BOOST_DATA_TEST_CASE(one_over_the_limit_is_reported_and_the_link_continues, ever
     BOOST_TEST((pair.far.events->head == std::string(1200, 'c')));
 }
 
-BOOST_DATA_TEST_CASE(each_source_is_a_link_of_its_own, every_datagram, kind) {
+CLES_DATA_TEST_CASE(each_source_is_a_link_of_its_own, every_datagram, kind) {
     link_pair pair{kind};
     std::vector<link_end> nears;
     std::vector<link_end> fars;
@@ -165,7 +164,7 @@ BOOST_AUTO_TEST_CASE(what_waits_behind_the_first_datagram_of_a_source_leaves_it_
     BOOST_TEST((events->lines == lines{"the first", "2nd", "a longer third"}));
 }
 
-BOOST_DATA_TEST_CASE(a_dialled_link_receives_only_from_its_peer, every_datagram, kind) {
+CLES_DATA_TEST_CASE(a_dialled_link_receives_only_from_its_peer, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     // The port of the near end is known to the far end.
@@ -178,7 +177,7 @@ BOOST_DATA_TEST_CASE(a_dialled_link_receives_only_from_its_peer, every_datagram,
     BOOST_TEST((pair.near.events->lines == lines{"the peer's word"}));
 }
 
-BOOST_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_datagram, kind) {
+CLES_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     std::string text;
@@ -200,7 +199,7 @@ BOOST_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_datagram, kind) {
     BOOST_TEST(seen_by_others <= 257U);
 }
 
-BOOST_DATA_TEST_CASE(what_arrives_while_a_link_is_paused_is_lost, every_datagram, kind) {
+CLES_DATA_TEST_CASE(what_arrives_while_a_link_is_paused_is_lost, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     pair.until([&] { return pair.far.lines() == 1; });
@@ -213,7 +212,7 @@ BOOST_DATA_TEST_CASE(what_arrives_while_a_link_is_paused_is_lost, every_datagram
     BOOST_TEST(pair.far.events->lines[1] == "heard");
 }
 
-BOOST_DATA_TEST_CASE(a_missing_listener_is_not_an_error, every_datagram, kind) {
+CLES_DATA_TEST_CASE(a_missing_listener_is_not_an_error, every_datagram, kind) {
     link_pair pair{kind};
     pair.stop_listening();
     cles::link_ptr made;
@@ -239,7 +238,7 @@ BOOST_DATA_TEST_CASE(a_missing_listener_is_not_an_error, every_datagram, kind) {
     arrived->close();
 }
 
-BOOST_DATA_TEST_CASE(links_outlive_their_acceptor_and_the_address_is_free_after_the_last, every_datagram, kind) {
+CLES_DATA_TEST_CASE(links_outlive_their_acceptor_and_the_address_is_free_after_the_last, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     pair.stop_listening();
@@ -252,7 +251,7 @@ BOOST_DATA_TEST_CASE(links_outlive_their_acceptor_and_the_address_is_free_after_
     BOOST_CHECK_NO_THROW(pair.transport().listen(pair.io.get_executor(), pair.address(), pair.bounds()));
 }
 
-BOOST_DATA_TEST_CASE(a_closed_link_is_silent_and_its_source_may_make_a_new_one, every_datagram, kind) {
+CLES_DATA_TEST_CASE(a_closed_link_is_silent_and_its_source_may_make_a_new_one, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     pair.until([&] { return pair.far.lines() == 1; });
@@ -265,7 +264,7 @@ BOOST_DATA_TEST_CASE(a_closed_link_is_silent_and_its_source_may_make_a_new_one, 
     BOOST_TEST(first.events->calls == "lb");
 }
 
-BOOST_DATA_TEST_CASE(to_finish_is_to_send_what_is_left_and_to_be_lost, every_datagram, kind) {
+CLES_DATA_TEST_CASE(to_finish_is_to_send_what_is_left_and_to_be_lost, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     pair.until([&] { return pair.far.lines() == 1; });
@@ -276,7 +275,7 @@ BOOST_DATA_TEST_CASE(to_finish_is_to_send_what_is_left_and_to_be_lost, every_dat
     BOOST_TEST(pair.far.events->in_order());
 }
 
-BOOST_DATA_TEST_CASE(an_owner_may_close_the_link_from_inside_its_line, every_datagram, kind) {
+CLES_DATA_TEST_CASE(an_owner_may_close_the_link_from_inside_its_line, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.events->hook = [&](char call) {

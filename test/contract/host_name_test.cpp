@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
 // A host name is resolved in parallel with the event loop, which continues meanwhile.
 
+#include "support/data_test_case.hpp"
 #include "support/link_pair.hpp"
 #include "support/run_until.hpp"
 #include "support/test_suite.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/steady_timer.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <filesystem>
@@ -76,7 +76,7 @@ using namespace cles::test;
 using namespace std::chrono_literals;
 namespace asio = boost::asio;
 
-const auto schemes = boost::unit_test::data::make({std::string{"tcp"}, std::string{"udp"}});
+const std::array schemes{std::string{"tcp"}, std::string{"udp"}};
 
 std::ptrdiff_t threads() {
     return std::distance(std::filesystem::directory_iterator{"/proc/self/task"}, std::filesystem::directory_iterator{});
@@ -109,7 +109,7 @@ struct dialled {
     std::function<void()> give_up;
 };
 
-BOOST_DATA_TEST_CASE(a_name_leads_to_its_host, schemes, scheme) {
+CLES_DATA_TEST_CASE(a_name_leads_to_its_host, schemes, scheme) {
     asio::io_context io;
     auto at = cles::find_transport(scheme)->listen(io.get_executor(), cles::parse_url(scheme + "://127.0.0.1:0"), {});
     dialled one{io, scheme + "://car1.test:" + std::to_string(at->local().port)};
@@ -118,14 +118,14 @@ BOOST_DATA_TEST_CASE(a_name_leads_to_its_host, schemes, scheme) {
     BOOST_TEST(one.link->peer().address == to_string(at->local()));
 }
 
-BOOST_DATA_TEST_CASE(an_unknown_name_is_an_error, schemes, scheme) {
+CLES_DATA_TEST_CASE(an_unknown_name_is_an_error, schemes, scheme) {
     asio::io_context io;
     dialled one{io, scheme + "://nobody.test:4000"};
     run_until(io, [&] { return one.calls != 0; });
     BOOST_TEST((one.code == asio::error::host_not_found));
 }
 
-BOOST_DATA_TEST_CASE(while_a_name_is_resolved_the_loop_runs_and_the_time_is_bounded, schemes, scheme) {
+CLES_DATA_TEST_CASE(while_a_name_is_resolved_the_loop_runs_and_the_time_is_bounded, schemes, scheme) {
     asio::io_context io;
     const slowness names;
     dialled one{io, scheme + "://car1.slow.test:4000", 100ms};
@@ -144,7 +144,7 @@ BOOST_DATA_TEST_CASE(while_a_name_is_resolved_the_loop_runs_and_the_time_is_boun
     BOOST_TEST(turns > 2);
 }
 
-BOOST_DATA_TEST_CASE(a_cancelled_lookup_does_not_report, schemes, scheme) {
+CLES_DATA_TEST_CASE(a_cancelled_lookup_does_not_report, schemes, scheme) {
     asio::io_context io;
     auto names = std::make_unique<slowness>();
     dialled one{io, scheme + "://car1.slow.test:4000"};
@@ -160,7 +160,7 @@ BOOST_DATA_TEST_CASE(a_cancelled_lookup_does_not_report, schemes, scheme) {
     BOOST_TEST(next.calls == 0);
 }
 
-BOOST_DATA_TEST_CASE(the_first_name_starts_the_one_thread_and_addresses_never_do, schemes, scheme) {
+CLES_DATA_TEST_CASE(the_first_name_starts_the_one_thread_and_addresses_never_do, schemes, scheme) {
     asio::io_context io;
     auto at = cles::find_transport(scheme)->listen(io.get_executor(), cles::parse_url(scheme + "://127.0.0.1:0"), {});
     const auto port = std::to_string(at->local().port);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // How a link ends, for every transport.
 
+#include "support/data_test_case.hpp"
 #include "support/link_pair.hpp"
 #include "support/scripted_peer.hpp"
 #include "support/test_suite.hpp"
@@ -29,7 +30,7 @@ std::string many_lines(std::size_t count) {
 
 } // namespace
 
-BOOST_DATA_TEST_CASE(finish_writes_what_is_left_and_both_ends_see_the_end, every_carrier, kind) {
+CLES_DATA_TEST_CASE(finish_writes_what_is_left_and_both_ends_see_the_end, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.run([&] {
@@ -47,7 +48,7 @@ BOOST_DATA_TEST_CASE(finish_writes_what_is_left_and_both_ends_see_the_end, every
     BOOST_TEST(!pair.near.events->has('e')); // events after its own end are not examined
 }
 
-BOOST_DATA_TEST_CASE(finish_at_both_ends_at_once_ends_the_link, every_carrier, kind) {
+CLES_DATA_TEST_CASE(finish_at_both_ends_at_once_ends_the_link, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.run([&] { pair.near.link->finish(); });
@@ -55,7 +56,7 @@ BOOST_DATA_TEST_CASE(finish_at_both_ends_at_once_ends_the_link, every_carrier, k
     pair.until([&] { return pair.near.lost() && pair.far.lost(); });
 }
 
-BOOST_DATA_TEST_CASE(finish_does_not_wait_for_a_peer_that_stays, every_carrier, kind) {
+CLES_DATA_TEST_CASE(finish_does_not_wait_for_a_peer_that_stays, every_carrier, kind) {
     link_pair pair{kind, {.discard = 100ms}};
     pair.open();
     pair.near.run([&] { pair.near.link->finish(); });
@@ -63,7 +64,7 @@ BOOST_DATA_TEST_CASE(finish_does_not_wait_for_a_peer_that_stays, every_carrier, 
     pair.until([&] { return pair.near.lost(); });
 }
 
-BOOST_DATA_TEST_CASE(finish_discards_what_the_peer_still_sends, every_carrier, kind) {
+CLES_DATA_TEST_CASE(finish_discards_what_the_peer_still_sends, every_carrier, kind) {
     link_pair pair{kind, {.discard = patience}}; // even on a slow machine
     pair.open();
     pair.far.say(many_lines(200));
@@ -82,7 +83,7 @@ BOOST_DATA_TEST_CASE(finish_discards_what_the_peer_still_sends, every_carrier, k
     BOOST_TEST(pair.near.lines() == seen);
 }
 
-BOOST_DATA_TEST_CASE(finish_waits_for_a_peer_that_reads_slowly, every_carrier, kind) {
+CLES_DATA_TEST_CASE(finish_waits_for_a_peer_that_reads_slowly, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.run([&] { pair.far.link->pause(true); });
@@ -97,7 +98,7 @@ BOOST_DATA_TEST_CASE(finish_waits_for_a_peer_that_reads_slowly, every_carrier, k
     BOOST_TEST(pair.far.lines() == 8000U);
 }
 
-BOOST_DATA_TEST_CASE(after_the_peers_end_there_is_still_writing, every_carrier, kind) {
+CLES_DATA_TEST_CASE(after_the_peers_end_there_is_still_writing, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.run([&] { pair.near.link->finish(); });
@@ -109,7 +110,7 @@ BOOST_DATA_TEST_CASE(after_the_peers_end_there_is_still_writing, every_carrier, 
 }
 
 // Not detected by reading.
-BOOST_DATA_TEST_CASE(a_peer_that_vanishes_after_its_end_of_stream_is_noticed, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_peer_that_vanishes_after_its_end_of_stream_is_noticed, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
@@ -132,7 +133,7 @@ BOOST_DATA_TEST_CASE(a_peer_that_vanishes_after_its_end_of_stream_is_noticed, ev
     BOOST_TEST(pair.far.events->in_order());
 }
 
-BOOST_DATA_TEST_CASE(no_event_follows_close_and_the_peer_is_notified, every_carrier, kind) {
+CLES_DATA_TEST_CASE(no_event_follows_close_and_the_peer_is_notified, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.say("on its way\n");
@@ -149,7 +150,7 @@ BOOST_DATA_TEST_CASE(no_event_follows_close_and_the_peer_is_notified, every_carr
     BOOST_TEST(pair.far.run([&] { return pair.far.events->in_order(); }));
 }
 
-BOOST_DATA_TEST_CASE(what_was_flushed_before_close_arrives, every_carrier, kind) {
+CLES_DATA_TEST_CASE(what_was_flushed_before_close_arrives, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     std::string text;
@@ -165,7 +166,7 @@ BOOST_DATA_TEST_CASE(what_was_flushed_before_close_arrives, every_carrier, kind)
     BOOST_TEST(pair.far.lines() == 5000U);
 }
 
-BOOST_DATA_TEST_CASE(what_was_flushed_before_close_arrives_even_before_the_peer_starts, every_carrier, kind) {
+CLES_DATA_TEST_CASE(what_was_flushed_before_close_arrives_even_before_the_peer_starts, every_carrier, kind) {
     link_pair pair{kind};
     pair.connect();
     pair.near.start();
@@ -181,7 +182,7 @@ BOOST_DATA_TEST_CASE(what_was_flushed_before_close_arrives_even_before_the_peer_
     BOOST_TEST(pair.far.lines() == 1U);
 }
 
-BOOST_DATA_TEST_CASE(all_calls_on_a_closed_link_do_nothing, every_carrier, kind) {
+CLES_DATA_TEST_CASE(all_calls_on_a_closed_link_do_nothing, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.run([&] {
@@ -230,7 +231,7 @@ BOOST_DATA_TEST_CASE(close_from_inside_a_callback_is_the_end,
     });
 }
 
-BOOST_DATA_TEST_CASE(close_from_inside_on_overlong_is_the_end, every_carrier, kind) {
+CLES_DATA_TEST_CASE(close_from_inside_on_overlong_is_the_end, every_carrier, kind) {
     link_pair pair{kind, {.line = 100}};
     pair.connect();
     bool head_is_whole = false;
@@ -251,7 +252,7 @@ BOOST_DATA_TEST_CASE(close_from_inside_on_overlong_is_the_end, every_carrier, ki
     BOOST_TEST(head_is_whole);
 }
 
-BOOST_DATA_TEST_CASE(close_from_inside_on_writable_is_the_end, every_carrier, kind) {
+CLES_DATA_TEST_CASE(close_from_inside_on_writable_is_the_end, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.events->hook = [&](char call) {
@@ -320,7 +321,7 @@ BOOST_DATA_TEST_CASE(a_line_stays_valid_for_its_call_even_if_the_link_is_closed_
     pair.until([&] { return pair.near.lost(); });
 }
 
-BOOST_DATA_TEST_CASE(finish_from_inside_on_line_hands_no_more_lines_over, every_carrier, kind) {
+CLES_DATA_TEST_CASE(finish_from_inside_on_line_hands_no_more_lines_over, every_carrier, kind) {
     link_pair pair{kind};
     pair.connect();
     pair.far.run([&] {
@@ -341,7 +342,7 @@ BOOST_DATA_TEST_CASE(finish_from_inside_on_line_hands_no_more_lines_over, every_
     BOOST_TEST(pair.near.events->lines.front() == "enough");
 }
 
-BOOST_DATA_TEST_CASE(half_close_is_an_end_and_answers_still_go_out, every_socket, kind) {
+CLES_DATA_TEST_CASE(half_close_is_an_end_and_answers_still_go_out, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
@@ -359,7 +360,7 @@ BOOST_DATA_TEST_CASE(half_close_is_an_end_and_answers_still_go_out, every_socket
     BOOST_TEST(pair.far.events->in_order());
 }
 
-BOOST_DATA_TEST_CASE(a_reset_is_a_loss, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_reset_is_a_loss, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
@@ -376,7 +377,7 @@ BOOST_DATA_TEST_CASE(a_reset_is_a_loss, every_socket, kind) {
     BOOST_TEST(pair.far.events->count('x') == 1U);
 }
 
-BOOST_DATA_TEST_CASE(a_reset_while_output_waits_is_a_loss, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_reset_while_output_waits_is_a_loss, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
@@ -389,7 +390,7 @@ BOOST_DATA_TEST_CASE(a_reset_while_output_waits_is_a_loss, every_socket, kind) {
     BOOST_TEST(pair.far.events->count('x') == 1U);
 }
 
-BOOST_DATA_TEST_CASE(a_reset_while_finishing_is_a_loss, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_reset_while_finishing_is_a_loss, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
@@ -402,7 +403,7 @@ BOOST_DATA_TEST_CASE(a_reset_while_finishing_is_a_loss, every_socket, kind) {
     BOOST_TEST(pair.far.events->count('x') == 1U);
 }
 
-BOOST_DATA_TEST_CASE(a_write_to_a_closed_peer_is_a_loss_reported_later, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_write_to_a_closed_peer_is_a_loss_reported_later, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
@@ -423,7 +424,7 @@ BOOST_DATA_TEST_CASE(a_write_to_a_closed_peer_is_a_loss_reported_later, every_so
     BOOST_TEST(pair.far.events->count('x') == 1U);
 }
 
-BOOST_DATA_TEST_CASE(links_may_go_with_everything_under_way, every_carrier, kind) {
+CLES_DATA_TEST_CASE(links_may_go_with_everything_under_way, every_carrier, kind) {
     for (int stage = 0; stage < 6; ++stage) {
         link_pair pair{kind};
         pair.connect();

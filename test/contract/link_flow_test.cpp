@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Flow control of a link when one end is slower than the other, for every transport.
 
+#include "support/data_test_case.hpp"
 #include "support/link_pair.hpp"
 #include "support/scripted_peer.hpp"
 
@@ -30,7 +31,7 @@ std::string many_lines(std::size_t count, std::size_t length) {
 
 } // namespace
 
-BOOST_DATA_TEST_CASE(what_a_peer_does_not_read_waits_and_nothing_is_lost, every_carrier, kind) {
+CLES_DATA_TEST_CASE(what_a_peer_does_not_read_waits_and_nothing_is_lost, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.run([&] { pair.far.link->pause(true); });
@@ -80,7 +81,7 @@ BOOST_DATA_TEST_CASE(what_is_urgent_passes_what_waits_and_breaks_no_line, every_
     }
 }
 
-BOOST_DATA_TEST_CASE(on_writable_is_not_called_from_inside_flush, every_carrier, kind) {
+CLES_DATA_TEST_CASE(on_writable_is_not_called_from_inside_flush, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     bool flushing = false;
@@ -98,7 +99,7 @@ BOOST_DATA_TEST_CASE(on_writable_is_not_called_from_inside_flush, every_carrier,
 }
 
 // An owner that waits after a flush that could not write everything is notified, even if only a little was left.
-BOOST_DATA_TEST_CASE(on_writable_follows_any_flush_that_left_something, every_carrier, kind) {
+CLES_DATA_TEST_CASE(on_writable_follows_any_flush_that_left_something, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.run([&] { pair.far.link->pause(true); });
@@ -112,7 +113,7 @@ BOOST_DATA_TEST_CASE(on_writable_follows_any_flush_that_left_something, every_ca
     BOOST_TEST(pair.near.events->has('r') == left);
 }
 
-BOOST_DATA_TEST_CASE(a_paused_link_delivers_nothing_until_it_is_resumed, every_carrier, kind) {
+CLES_DATA_TEST_CASE(a_paused_link_delivers_nothing_until_it_is_resumed, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.run([&] { pair.far.link->pause(true); });
@@ -128,7 +129,7 @@ BOOST_DATA_TEST_CASE(a_paused_link_delivers_nothing_until_it_is_resumed, every_c
     pair.until([&] { return pair.far.lines() == 3; });
 }
 
-BOOST_DATA_TEST_CASE(a_pause_during_hand_over_holds_back_the_next_line, every_carrier, kind) {
+CLES_DATA_TEST_CASE(a_pause_during_hand_over_holds_back_the_next_line, every_carrier, kind) {
     link_pair pair{kind};
     pair.connect();
     pair.far.run([&] {
@@ -149,7 +150,7 @@ BOOST_DATA_TEST_CASE(a_pause_during_hand_over_holds_back_the_next_line, every_ca
     pair.until([&] { return pair.far.lines() == 5; });
 }
 
-BOOST_DATA_TEST_CASE(pausing_and_going_on_at_every_line_loses_nothing, every_carrier, kind) {
+CLES_DATA_TEST_CASE(pausing_and_going_on_at_every_line_loses_nothing, every_carrier, kind) {
     link_pair pair{kind};
     pair.connect();
     pair.far.run([&] {
@@ -171,7 +172,7 @@ BOOST_DATA_TEST_CASE(pausing_and_going_on_at_every_line_loses_nothing, every_car
     BOOST_TEST(pair.far.run([&] { return pair.far.events->lines.back().starts_with("299."); }));
 }
 
-BOOST_DATA_TEST_CASE(a_paused_link_still_writes, every_carrier, kind) {
+CLES_DATA_TEST_CASE(a_paused_link_still_writes, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.run([&] { pair.far.link->pause(true); });
@@ -179,7 +180,7 @@ BOOST_DATA_TEST_CASE(a_paused_link_still_writes, every_carrier, kind) {
     pair.until([&] { return pair.near.lines() == 1; });
 }
 
-BOOST_DATA_TEST_CASE(an_unread_socket_fills_and_drains, every_socket, kind) {
+CLES_DATA_TEST_CASE(an_unread_socket_fills_and_drains, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address()), buffers::small};
     pair.accept();
@@ -199,7 +200,7 @@ BOOST_DATA_TEST_CASE(an_unread_socket_fills_and_drains, every_socket, kind) {
     BOOST_TEST(pair.far.events->count('r') == 1U);
 }
 
-BOOST_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_stream, kind) {
+CLES_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_stream, kind) {
     link_pair pair{kind};
     pair.open();
     const auto large = std::string(1'000'000, 'x') + "\n";
@@ -220,7 +221,7 @@ BOOST_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_strea
     pair.until([&] { return pair.near.lines() == 2; });
 }
 
-BOOST_DATA_TEST_CASE(nothing_is_lost_while_a_link_gives_back_memory, every_stream, kind) {
+CLES_DATA_TEST_CASE(nothing_is_lost_while_a_link_gives_back_memory, every_stream, kind) {
     link_pair pair{kind};
     pair.open();
     for (std::size_t i = 0; i < 300; ++i) {

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 // How lines are delivered, for every transport.
 
+#include "support/data_test_case.hpp"
 #include "support/link_pair.hpp"
 #include "support/scripted_peer.hpp"
 
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <string>
@@ -47,7 +46,7 @@ std::size_t bytes_of(const std::vector<std::string>& lines) {
 
 } // namespace
 
-BOOST_DATA_TEST_CASE(lines_arrive_whole_and_in_order_in_both_directions, every_carrier, kind) {
+CLES_DATA_TEST_CASE(lines_arrive_whole_and_in_order_in_both_directions, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     const auto there = numbered_lines(3000, 'x');
@@ -67,7 +66,7 @@ BOOST_DATA_TEST_CASE(lines_arrive_whole_and_in_order_in_both_directions, every_c
     BOOST_TEST(!pair.far.over());
 }
 
-BOOST_DATA_TEST_CASE(what_was_said_before_the_peer_starts_waits_for_it, every_carrier, kind) {
+CLES_DATA_TEST_CASE(what_was_said_before_the_peer_starts_waits_for_it, every_carrier, kind) {
     link_pair pair{kind};
     pair.connect();
     pair.near.start();
@@ -79,7 +78,7 @@ BOOST_DATA_TEST_CASE(what_was_said_before_the_peer_starts_waits_for_it, every_ca
     BOOST_TEST(pair.far.run([&] { return pair.far.events->lines.back(); }) == "two");
 }
 
-BOOST_DATA_TEST_CASE(every_batch_ends_with_on_batch, every_carrier, kind) {
+CLES_DATA_TEST_CASE(every_batch_ends_with_on_batch, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.say("1\n2\n3\n");
@@ -90,7 +89,7 @@ BOOST_DATA_TEST_CASE(every_batch_ends_with_on_batch, every_carrier, kind) {
 }
 
 // A link with thousands of lines to deliver must not delay other links.
-BOOST_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_carrier, kind) {
+CLES_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     constexpr std::size_t flood = 20000;
@@ -110,7 +109,7 @@ BOOST_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_carrier, kind) {
     BOOST_TEST(longest <= 4096U);
 }
 
-BOOST_DATA_TEST_CASE(empty_lines_and_carriage_returns_are_handed_over_as_they_are, every_carrier, kind) {
+CLES_DATA_TEST_CASE(empty_lines_and_carriage_returns_are_handed_over_as_they_are, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.say("\n\r\n a \n");
@@ -118,7 +117,7 @@ BOOST_DATA_TEST_CASE(empty_lines_and_carriage_returns_are_handed_over_as_they_ar
     BOOST_TEST(pair.far.run([&] { return pair.far.events->lines == std::vector<std::string>{"", "\r", " a "}; }));
 }
 
-BOOST_DATA_TEST_CASE(a_line_of_just_the_limit_crosses, every_carrier, kind) {
+CLES_DATA_TEST_CASE(a_line_of_just_the_limit_crosses, every_carrier, kind) {
     link_pair pair{kind, {.line = 5000}};
     pair.open();
     const std::string longest(5000, 'x');
@@ -128,7 +127,7 @@ BOOST_DATA_TEST_CASE(a_line_of_just_the_limit_crosses, every_carrier, kind) {
     BOOST_TEST(!pair.far.run([&] { return pair.far.events->has('o'); }));
 }
 
-BOOST_DATA_TEST_CASE(lines_of_a_mebibyte_cross, every_carrier, kind) {
+CLES_DATA_TEST_CASE(lines_of_a_mebibyte_cross, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     const std::string longest(1U << 20U, 'x');
@@ -140,7 +139,7 @@ BOOST_DATA_TEST_CASE(lines_of_a_mebibyte_cross, every_carrier, kind) {
     BOOST_TEST(pair.far.run([&] { return pair.far.events->lines[5] == "small"; }));
 }
 
-BOOST_DATA_TEST_CASE(one_over_the_limit_is_reported_once_and_no_line_follows, every_carrier, kind) {
+CLES_DATA_TEST_CASE(one_over_the_limit_is_reported_once_and_no_line_follows, every_carrier, kind) {
     link_pair pair{kind, {.line = 5000}};
     pair.open();
     pair.near.say("before\n" + std::string(5001, 'x') + "\nafter\n");
@@ -162,7 +161,7 @@ BOOST_DATA_TEST_CASE(one_over_the_limit_is_reported_once_and_no_line_follows, ev
     });
 }
 
-BOOST_DATA_TEST_CASE(bytes_one_at_a_time_make_the_same_lines, every_socket, kind) {
+CLES_DATA_TEST_CASE(bytes_one_at_a_time_make_the_same_lines, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
@@ -177,7 +176,7 @@ BOOST_DATA_TEST_CASE(bytes_one_at_a_time_make_the_same_lines, every_socket, kind
     BOOST_TEST((pair.far.events->lines == std::vector<std::string>{"PULL self:cles\r", "", "{\"a\":1}", "last"}));
 }
 
-BOOST_DATA_TEST_CASE(an_endless_line_is_reported_as_soon_as_it_is_too_long, every_socket, kind) {
+CLES_DATA_TEST_CASE(an_endless_line_is_reported_as_soon_as_it_is_too_long, every_socket, kind) {
     link_pair pair{kind, {.line = 5000}};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
@@ -187,7 +186,7 @@ BOOST_DATA_TEST_CASE(an_endless_line_is_reported_as_soon_as_it_is_too_long, ever
     BOOST_TEST(pair.far.lines() == 0U);
 }
 
-BOOST_DATA_TEST_CASE(an_unfinished_line_at_the_end_is_no_line, every_socket, kind) {
+CLES_DATA_TEST_CASE(an_unfinished_line_at_the_end_is_no_line, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();

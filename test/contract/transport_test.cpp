@@ -3,12 +3,11 @@
 
 #include <cles/error.hpp>
 
+#include "support/data_test_case.hpp"
 #include "support/link_pair.hpp"
 #include "support/scripted_peer.hpp"
 
 #include <boost/asio/error.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
@@ -60,7 +59,7 @@ BOOST_AUTO_TEST_CASE(an_unregistered_scheme_has_no_transport) {
     BOOST_TEST(cles::find_transport("") == nullptr);
 }
 
-BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, listening_carriers, kind) {
+CLES_DATA_TEST_CASE(the_acceptor_knows_its_real_address, listening_carriers, kind) {
     link_pair pair{kind};
     if (pair.address().scheme == "tcp" || pair.address().scheme == "tls" || pair.address().scheme == "udp") {
         BOOST_TEST(pair.address().port != 0);
@@ -70,7 +69,7 @@ BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, listening_carriers, ki
     pair.open();
 }
 
-BOOST_DATA_TEST_CASE(both_ends_know_who_the_other_is, listening_carriers, kind) {
+CLES_DATA_TEST_CASE(both_ends_know_who_the_other_is, listening_carriers, kind) {
     link_pair pair{kind};
     pair.connect();
     const auto far = pair.far.run([&] { return pair.far.link->peer(); });
@@ -91,7 +90,7 @@ BOOST_DATA_TEST_CASE(both_ends_know_who_the_other_is, listening_carriers, kind) 
     }
 }
 
-BOOST_DATA_TEST_CASE(many_links_come_in_by_one_acceptor, every_carrier, kind) {
+CLES_DATA_TEST_CASE(many_links_come_in_by_one_acceptor, every_carrier, kind) {
     link_pair pair{kind};
     std::vector<link_end> nears;
     std::vector<link_end> fars;
@@ -116,7 +115,7 @@ BOOST_DATA_TEST_CASE(many_links_come_in_by_one_acceptor, every_carrier, kind) {
     }
 }
 
-BOOST_DATA_TEST_CASE(dialling_without_a_listener_is_refused_and_never_inside_the_call, every_carrier, kind) {
+CLES_DATA_TEST_CASE(dialling_without_a_listener_is_refused_and_never_inside_the_call, every_carrier, kind) {
     link_pair pair{kind};
     pair.stop_listening();
     dial_result result;
@@ -131,7 +130,7 @@ BOOST_DATA_TEST_CASE(dialling_without_a_listener_is_refused_and_never_inside_the
     BOOST_TEST(fits, result.code.message());
 }
 
-BOOST_DATA_TEST_CASE(a_dial_that_was_given_up_never_calls_back, listening_carriers, kind) {
+CLES_DATA_TEST_CASE(a_dial_that_was_given_up_never_calls_back, listening_carriers, kind) {
     link_pair pair{kind};
     dial_result result;
     const auto give_up =
@@ -148,7 +147,7 @@ BOOST_DATA_TEST_CASE(a_dial_that_was_given_up_never_calls_back, listening_carrie
     BOOST_TEST(result.calls == 0);
 }
 
-BOOST_DATA_TEST_CASE(giving_up_after_the_dial_ended_does_nothing, every_carrier, kind) {
+CLES_DATA_TEST_CASE(giving_up_after_the_dial_ended_does_nothing, every_carrier, kind) {
     link_pair pair{kind};
     dial_result result;
     const auto give_up =
@@ -194,14 +193,14 @@ BOOST_AUTO_TEST_CASE(a_unix_socket_whose_queue_is_full_is_an_error_and_no_link) 
     BOOST_TEST(dials.back()->made == nullptr);
 }
 
-BOOST_DATA_TEST_CASE(an_address_in_use_is_refused, listening_carriers, kind) {
+CLES_DATA_TEST_CASE(an_address_in_use_is_refused, listening_carriers, kind) {
     link_pair pair{kind};
     asio::io_context other;
     BOOST_TEST(listen_failure(other, pair.address()) == asio::error::address_in_use);
     pair.open(); // and the first one is not affected
 }
 
-BOOST_DATA_TEST_CASE(an_address_is_free_again_after_its_acceptor_is_destroyed, every_carrier, kind) {
+CLES_DATA_TEST_CASE(an_address_is_free_again_after_its_acceptor_is_destroyed, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.stop_listening();
@@ -210,7 +209,7 @@ BOOST_DATA_TEST_CASE(an_address_is_free_again_after_its_acceptor_is_destroyed, e
     pair.until([&] { return pair.far.lines() == 1; });
 }
 
-BOOST_DATA_TEST_CASE(nothing_is_accepted_after_an_acceptor_was_closed, every_carrier, kind) {
+CLES_DATA_TEST_CASE(nothing_is_accepted_after_an_acceptor_was_closed, every_carrier, kind) {
     link_pair pair{kind};
     dial_result result;
     pair.far.run([&] { // in one step, so that no connection arrives meanwhile

@@ -4,10 +4,9 @@
 #include <cles/link.hpp>
 
 #include "client/wire_log.hpp"
+#include "support/data_test_case.hpp"
 #include "support/link_pair.hpp"
 
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <cstddef>
@@ -101,7 +100,7 @@ BOOST_FIXTURE_TEST_CASE(what_it_holds_itself_counts_and_is_given_back, fixture) 
     BOOST_TEST(outside->buffered() < 51'000U);
 }
 
-BOOST_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_socket, kind) {
+CLES_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_socket, kind) {
     link_pair pair{kind};
     pair.connect();
     std::size_t lines = 0;

@@ -4,14 +4,13 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/feed_log.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
 
 #include <boost/asio/error.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <string>
@@ -42,7 +41,7 @@ refusal refusal_of(const cles::service_options& options) {
     return {};
 }
 
-BOOST_DATA_TEST_CASE(an_authoriser_that_denies_all_lets_nothing_through, carriers, kind) {
+CLES_DATA_TEST_CASE(an_authoriser_that_denies_all_lets_nothing_through, carriers, kind) {
     boost::asio::io_context io;
     auto options = listening("car1", kind);
     std::vector<std::string> asked;
@@ -129,7 +128,7 @@ BOOST_AUTO_TEST_CASE(listening_beyond_this_host_needs_insecure) {
     BOOST_TEST(car.endpoints().empty());
 }
 
-BOOST_DATA_TEST_CASE(an_address_that_is_taken_is_the_systems_error_and_is_named, carriers, kind) {
+CLES_DATA_TEST_CASE(an_address_that_is_taken_is_the_systems_error_and_is_named, carriers, kind) {
     boost::asio::io_context io;
     cles::service first{io, listening("car1", kind)};
     const auto where = first.endpoints().front();

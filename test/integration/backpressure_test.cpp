@@ -4,6 +4,7 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/feed_log.hpp"
 #include "support/metric.hpp"
 #include "support/node.hpp"
@@ -11,8 +12,6 @@
 #include "support/scripted_peer.hpp"
 
 #include <boost/asio/post.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
@@ -49,7 +48,7 @@ struct steady_publisher {
     }
 };
 
-BOOST_DATA_TEST_CASE(async_update_waits_for_capacity_so_that_all_is_delivered, carriers, kind) {
+CLES_DATA_TEST_CASE(async_update_waits_for_capacity_so_that_all_is_delivered, carriers, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     cles::service tower{io, knowing("tower", car)};
@@ -69,7 +68,7 @@ BOOST_DATA_TEST_CASE(async_update_waits_for_capacity_so_that_all_is_delivered, c
     BOOST_TEST(metric(car, "updates_shed") == 0U);
 }
 
-BOOST_DATA_TEST_CASE(async_update_waits_for_a_peer_that_does_not_read, every_socket, kind) {
+CLES_DATA_TEST_CASE(async_update_waits_for_a_peer_that_does_not_read, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     car.on_bind("place");
@@ -87,7 +86,7 @@ BOOST_DATA_TEST_CASE(async_update_waits_for_a_peer_that_does_not_read, every_soc
     run_until(io, [&] { return publisher.done == count; });
 }
 
-BOOST_DATA_TEST_CASE(async_update_ends_with_its_service_and_continues_without_a_lost_subscriber, every_socket, kind) {
+CLES_DATA_TEST_CASE(async_update_ends_with_its_service_and_continues_without_a_lost_subscriber, every_socket, kind) {
     boost::asio::io_context io;
     auto car = std::make_unique<cles::service>(io, listening("car1", kind));
     car->on_bind("place");
@@ -153,7 +152,7 @@ BOOST_AUTO_TEST_CASE(a_publisher_that_throws_ends_the_turn_and_no_other_publishe
 }
 
 // Both wait, and continue as soon as they can.
-BOOST_DATA_TEST_CASE(a_lost_binder_sets_no_two_publishers_on_each_other, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_lost_binder_sets_no_two_publishers_on_each_other, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     car.on_bind("place");
@@ -176,7 +175,7 @@ BOOST_DATA_TEST_CASE(a_lost_binder_sets_no_two_publishers_on_each_other, every_s
     run_until(io, [&] { return one.code.failed() && other.code.failed(); });
 }
 
-BOOST_DATA_TEST_CASE(a_publisher_that_waited_may_throw_an_error_of_ours, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_publisher_that_waited_may_throw_an_error_of_ours, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     car.on_bind("place");
@@ -209,7 +208,7 @@ BOOST_AUTO_TEST_CASE(publishers_of_a_noun_go_on_in_their_order) {
     BOOST_TEST(feed.missed() == 0U);
 }
 
-BOOST_DATA_TEST_CASE(the_last_update_is_sent_before_the_service_ends, every_socket, kind) {
+CLES_DATA_TEST_CASE(the_last_update_is_sent_before_the_service_ends, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     cles::service tower{io, knowing("tower", car)};
@@ -235,7 +234,7 @@ BOOST_AUTO_TEST_CASE(what_was_published_before_the_end_was_published) {
     run_until(io, [&] { return good == 3; });
 }
 
-BOOST_DATA_TEST_CASE(a_slow_subscriber_delays_no_other_and_gets_the_newest, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_slow_subscriber_delays_no_other_and_gets_the_newest, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     cles::service tower{io, knowing("tower", car)};
@@ -266,7 +265,7 @@ BOOST_DATA_TEST_CASE(a_slow_subscriber_delays_no_other_and_gets_the_newest, ever
     BOOST_TEST(slow.ask("PULL self:cles").starts_with("{\"node\""));
 }
 
-BOOST_DATA_TEST_CASE(a_peer_that_never_reads_its_replies_is_not_read_and_then_closed, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_peer_that_never_reads_its_replies_is_not_read_and_then_closed, every_socket, kind) {
     boost::asio::io_context io;
     std::vector<std::string> said;
     auto options = listening("car1", kind, {.unread = 100'000, .stall = 150ms});
@@ -305,7 +304,7 @@ BOOST_DATA_TEST_CASE(a_peer_that_never_reads_its_replies_is_not_read_and_then_cl
     BOOST_TEST(other.ask("PULL self:much id=1").starts_with("id=1 "));
 }
 
-BOOST_DATA_TEST_CASE(a_peer_that_reads_slowly_gets_everything, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_peer_that_reads_slowly_gets_everything, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind, {.unread = 20'000, .stall = 10s})};
     car.on_pull("much", [](const cles::request& r) { return std::string(r.parameter(0)) + std::string(10'000, 'x'); });
@@ -319,7 +318,7 @@ BOOST_DATA_TEST_CASE(a_peer_that_reads_slowly_gets_everything, every_socket, kin
 }
 
 // A link that is paused at a limit must resume, with every transport.
-BOOST_DATA_TEST_CASE(small_limits_hold_back_and_let_go, carriers, kind) {
+CLES_DATA_TEST_CASE(small_limits_hold_back_and_let_go, carriers, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind, {.unread = 100, .waiting = 100})};
     cles::service tower{io, knowing("tower", car, {.unread = 100, .waiting = 100})};
@@ -336,7 +335,7 @@ BOOST_DATA_TEST_CASE(small_limits_hold_back_and_let_go, carriers, kind) {
     BOOST_TEST(std::none_of(all.begin(), all.end(), [](const auto& a) { return a->code.failed(); }));
 }
 
-BOOST_DATA_TEST_CASE(past_the_limit_of_links_the_next_is_refused_as_busy_and_closed, every_socket, kind) {
+CLES_DATA_TEST_CASE(past_the_limit_of_links_the_next_is_refused_as_busy_and_closed, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind, {.links = 3})};
     std::vector<scripted_peer> peers;
@@ -401,7 +400,7 @@ BOOST_AUTO_TEST_CASE(past_the_limits_of_handlers_bindings_and_nouns_the_next_is_
 }
 
 // A link that floods must not keep the node from serving others.
-BOOST_DATA_TEST_CASE(a_flood_on_one_link_leaves_others_their_turn, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_flood_on_one_link_leaves_others_their_turn, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     int flooded = 0;

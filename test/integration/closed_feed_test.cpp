@@ -4,6 +4,7 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 
@@ -11,8 +12,6 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/use_future.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <array>
@@ -80,7 +79,7 @@ BOOST_FIXTURE_TEST_SUITE(closed_feed, closed_feed_test::fixture)
 using namespace closed_feed_test;
 namespace data = boost::unit_test::data;
 
-BOOST_DATA_TEST_CASE(a_callback_is_called, data::make(every_how), h) {
+CLES_DATA_TEST_CASE(a_callback_is_called, every_how, h) {
     feed one;
     shut(one, h);
     BOOST_TEST(!one.is_open());
@@ -95,7 +94,7 @@ BOOST_DATA_TEST_CASE(a_callback_is_called, data::make(every_how), h) {
     BOOST_TEST(code == errc::closed);
 }
 
-BOOST_DATA_TEST_CASE(a_coroutine_gets_an_exception, data::make(every_how), h) {
+CLES_DATA_TEST_CASE(a_coroutine_gets_an_exception, every_how, h) {
     feed one;
     shut(one, h);
     std::exception_ptr thrown;
@@ -110,7 +109,7 @@ BOOST_DATA_TEST_CASE(a_coroutine_gets_an_exception, data::make(every_how), h) {
                           [](const cles::error& e) { return e.code() == errc::closed; });
 }
 
-BOOST_DATA_TEST_CASE(so_does_a_future, data::make(every_how), h) {
+CLES_DATA_TEST_CASE(so_does_a_future, every_how, h) {
     feed one;
     shut(one, h);
     auto result = one.async_next(asio::use_future);

@@ -6,13 +6,12 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/fault_transport.hpp"
 #include "support/feed_log.hpp"
 #include "support/run_until.hpp"
 
 #include <boost/asio/error.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <array>
@@ -91,7 +90,7 @@ void replay(fault how, const std::function<void(nodes&)>& scenario) {
     BOOST_TEST(step > 5);
 }
 
-BOOST_DATA_TEST_CASE(a_pull, every_fault, how) {
+CLES_DATA_TEST_CASE(a_pull, every_fault, how) {
     replay(how, [](nodes& n) {
         answer<int> a;
         n.tower.async_pull<int>("car1:speed", a.options(), a.take());
@@ -101,7 +100,7 @@ BOOST_DATA_TEST_CASE(a_pull, every_fault, how) {
     });
 }
 
-BOOST_DATA_TEST_CASE(all_verbs_at_once, every_fault, how) {
+CLES_DATA_TEST_CASE(all_verbs_at_once, every_fault, how) {
     replay(how, [](nodes& n) {
         answer<int> pull;
         answer<> push;
@@ -122,7 +121,7 @@ BOOST_DATA_TEST_CASE(all_verbs_at_once, every_fault, how) {
     });
 }
 
-BOOST_DATA_TEST_CASE(requests_one_after_another, every_fault, how) {
+CLES_DATA_TEST_CASE(requests_one_after_another, every_fault, how) {
     replay(how, [](nodes& n) {
         int failed = 0;
         for (int i = 0; i < 4; ++i) {
@@ -136,7 +135,7 @@ BOOST_DATA_TEST_CASE(requests_one_after_another, every_fault, how) {
     });
 }
 
-BOOST_DATA_TEST_CASE(a_withdrawal, every_fault, how) {
+CLES_DATA_TEST_CASE(a_withdrawal, every_fault, how) {
     replay(how, [](nodes& n) {
         std::vector<cles::responder> kept;
         n.car.on_delegate("wait", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
@@ -156,7 +155,7 @@ BOOST_DATA_TEST_CASE(a_withdrawal, every_fault, how) {
     });
 }
 
-BOOST_DATA_TEST_CASE(a_feed_catches_up_in_the_end, every_fault, how) {
+CLES_DATA_TEST_CASE(a_feed_catches_up_in_the_end, every_fault, how) {
     replay(how, [](nodes& n) {
         n.car.update("place", 1);
         feed_log feed;
@@ -181,7 +180,7 @@ BOOST_DATA_TEST_CASE(a_feed_catches_up_in_the_end, every_fault, how) {
     });
 }
 
-BOOST_DATA_TEST_CASE(two_feeds_and_a_close, every_fault, how) {
+CLES_DATA_TEST_CASE(two_feeds_and_a_close, every_fault, how) {
     replay(how, [](nodes& n) {
         feed_log stays;
         feed_log goes;
@@ -200,7 +199,7 @@ BOOST_DATA_TEST_CASE(two_feeds_and_a_close, every_fault, how) {
 }
 
 // Requests use the link that the feed is on.
-BOOST_DATA_TEST_CASE(requests_beside_a_feed, every_fault, how) {
+CLES_DATA_TEST_CASE(requests_beside_a_feed, every_fault, how) {
     replay(how, [](nodes& n) {
         feed_log feed;
         feed.bind(n.tower, "car1:place");
@@ -215,7 +214,7 @@ BOOST_DATA_TEST_CASE(requests_beside_a_feed, every_fault, how) {
 }
 
 // Destroys everything in the middle of any operation.
-BOOST_DATA_TEST_CASE(a_stop, every_fault, how) {
+CLES_DATA_TEST_CASE(a_stop, every_fault, how) {
     replay(how, [](nodes& n) {
         answer<int> pull;
         answer<int> drive;

@@ -4,6 +4,7 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/feed_log.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
@@ -72,7 +73,7 @@ struct nodes {
 
 std::string value(int i) { return "{\"value\":" + std::to_string(i) + "}"; }
 
-BOOST_DATA_TEST_CASE(a_feed_tells_the_current_value_and_then_every_update_in_order, carriers, kind) {
+CLES_DATA_TEST_CASE(a_feed_tells_the_current_value_and_then_every_update_in_order, carriers, kind) {
     nodes n{kind};
     n.car->update("place", 0);
     feed_log feed;
@@ -91,7 +92,7 @@ BOOST_DATA_TEST_CASE(a_feed_tells_the_current_value_and_then_every_update_in_ord
     BOOST_TEST(feed.missed() == 0U);
 }
 
-BOOST_DATA_TEST_CASE(nouns_are_bound_apart, carriers, kind) {
+CLES_DATA_TEST_CASE(nouns_are_bound_apart, carriers, kind) {
     nodes n{kind};
     feed_log plain;
     feed_log fast;
@@ -104,7 +105,7 @@ BOOST_DATA_TEST_CASE(nouns_are_bound_apart, carriers, kind) {
     BOOST_TEST(fast.items[0].value.text == value(1));
 }
 
-BOOST_DATA_TEST_CASE(several_feeds_on_one_noun_each_get_everything, carriers, kind) {
+CLES_DATA_TEST_CASE(several_feeds_on_one_noun_each_get_everything, carriers, kind) {
     nodes n{kind};
     std::vector<std::unique_ptr<feed_log>> all;
     for (int i = 0; i < 4; ++i) {
@@ -163,7 +164,7 @@ BOOST_AUTO_TEST_CASE(feeds_of_one_noun_and_the_same_terms_share_a_link_and_a_bin
     BOOST_TEST(told.value.text.find("\"updates_dropped\":0,") != std::string::npos, told.value.text);
 }
 
-BOOST_DATA_TEST_CASE(feeds_that_share_a_binding_come_back_together, two_carriers, kind) {
+CLES_DATA_TEST_CASE(feeds_that_share_a_binding_come_back_together, two_carriers, kind) {
     nodes n{kind};
     feed_log one;
     feed_log two;
@@ -182,7 +183,7 @@ BOOST_DATA_TEST_CASE(feeds_that_share_a_binding_come_back_together, two_carriers
     BOOST_TEST(two.bodies().back() == value(2));
 }
 
-BOOST_DATA_TEST_CASE(a_closed_feed_is_unbound_at_the_publisher, carriers, kind) {
+CLES_DATA_TEST_CASE(a_closed_feed_is_unbound_at_the_publisher, carriers, kind) {
     nodes n{kind};
     feed_log feed;
     n.until_bound(feed);
@@ -200,7 +201,7 @@ BOOST_DATA_TEST_CASE(a_closed_feed_is_unbound_at_the_publisher, carriers, kind) 
     run_until(n.io, [&] { return again.items.size() == 1; });
 }
 
-BOOST_DATA_TEST_CASE(a_bind_that_is_refused_fails_with_the_publishers_message, carriers, kind) {
+CLES_DATA_TEST_CASE(a_bind_that_is_refused_fails_with_the_publishers_message, carriers, kind) {
     nodes n{kind};
     feed_log none;
     none.bind(*n.tower, "car1:altitude");
@@ -215,7 +216,7 @@ BOOST_DATA_TEST_CASE(a_bind_that_is_refused_fails_with_the_publishers_message, c
     BOOST_TEST(nobody.code == errc::no_target, nobody.code.message());
 }
 
-BOOST_DATA_TEST_CASE(every_thins_without_gaps, carriers, kind) {
+CLES_DATA_TEST_CASE(every_thins_without_gaps, carriers, kind) {
     nodes n{kind};
     feed_log feed;
     n.until_bound(feed, "car1:place", cles::bind_options{}.every(30ms));
@@ -229,7 +230,7 @@ BOOST_DATA_TEST_CASE(every_thins_without_gaps, carriers, kind) {
     BOOST_TEST(feed.count(feed_event::gap) == 0U);
 }
 
-BOOST_DATA_TEST_CASE(a_feed_that_is_not_fetched_keeps_the_newest_and_shows_a_gap, carriers, kind) {
+CLES_DATA_TEST_CASE(a_feed_that_is_not_fetched_keeps_the_newest_and_shows_a_gap, carriers, kind) {
     nodes n{kind};
     n.tower = std::make_unique<cles::service>(n.io, knowing("tower", *n.car, {.feed = 10}));
     feed_log feed;
@@ -246,7 +247,7 @@ BOOST_DATA_TEST_CASE(a_feed_that_is_not_fetched_keeps_the_newest_and_shows_a_gap
     BOOST_TEST(feed.count(feed_event::update) == 10U);
 }
 
-BOOST_DATA_TEST_CASE(a_publisher_that_is_lost_and_returns_is_bound_again, carriers, kind) {
+CLES_DATA_TEST_CASE(a_publisher_that_is_lost_and_returns_is_bound_again, carriers, kind) {
     nodes n{kind};
     n.car->update("place", 1);
     feed_log feed;
@@ -267,7 +268,7 @@ BOOST_DATA_TEST_CASE(a_publisher_that_is_lost_and_returns_is_bound_again, carrie
     BOOST_TEST(feed.count(feed_event::lost) == 2U);
 }
 
-BOOST_DATA_TEST_CASE(a_feed_keeps_trying_while_the_publisher_is_away, two_carriers, kind) {
+CLES_DATA_TEST_CASE(a_feed_keeps_trying_while_the_publisher_is_away, two_carriers, kind) {
     nodes n{kind};
     feed_log feed;
     n.until_bound(feed);
@@ -283,7 +284,7 @@ BOOST_DATA_TEST_CASE(a_feed_keeps_trying_while_the_publisher_is_away, two_carrie
     run_until(n.io, [&] { return feed.count(feed_event::rebound) == 1; });
 }
 
-BOOST_DATA_TEST_CASE(a_publisher_that_returns_without_the_task_is_tried_again, two_carriers, kind) {
+CLES_DATA_TEST_CASE(a_publisher_that_returns_without_the_task_is_tried_again, two_carriers, kind) {
     nodes n{kind};
     feed_log feed;
     n.until_bound(feed);
@@ -299,7 +300,7 @@ BOOST_DATA_TEST_CASE(a_publisher_that_returns_without_the_task_is_tried_again, t
     run_until(n.io, [&] { return feed.count(feed_event::rebound) == 1; });
 }
 
-BOOST_DATA_TEST_CASE(stopping_the_binders_service_ends_its_feeds, carriers, kind) {
+CLES_DATA_TEST_CASE(stopping_the_binders_service_ends_its_feeds, carriers, kind) {
     nodes n{kind};
     feed_log waiting;
     n.until_bound(waiting);
@@ -315,7 +316,7 @@ BOOST_DATA_TEST_CASE(stopping_the_binders_service_ends_its_feeds, carriers, kind
     BOOST_TEST(after.code == errc::stopped);
 }
 
-BOOST_DATA_TEST_CASE(a_feed_outlives_its_service_and_fails_with_stopped, carriers, kind) {
+CLES_DATA_TEST_CASE(a_feed_outlives_its_service_and_fails_with_stopped, carriers, kind) {
     nodes n{kind};
     cles::feed<cles::json_text> feed;
     n.tower->async_bind("car1:place",
@@ -330,7 +331,7 @@ BOOST_DATA_TEST_CASE(a_feed_outlives_its_service_and_fails_with_stopped, carrier
 }
 
 // More than are delivered in one function.
-BOOST_DATA_TEST_CASE(a_handler_that_waits_again_gets_all_events_also_if_it_throws, carriers, kind) {
+CLES_DATA_TEST_CASE(a_handler_that_waits_again_gets_all_events_also_if_it_throws, carriers, kind) {
     nodes n{kind};
     auto feed = n.bound_feed(cles::bind_options{}.keep(100));
     std::vector<int> expected(50);

@@ -3,6 +3,7 @@
 
 #include <cles/service.hpp>
 
+#include "support/data_test_case.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
@@ -10,8 +11,6 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/use_future.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
@@ -76,7 +75,7 @@ std::size_t count(const std::string& text, const std::string& part) {
     return found;
 }
 
-BOOST_DATA_TEST_CASE(an_update_alone_is_written_in_its_call, every_socket, kind) {
+CLES_DATA_TEST_CASE(an_update_alone_is_written_in_its_call, every_socket, kind) {
     publishing p{kind};
     p.car.update("speed", 1);
     BOOST_TEST(p.come().ends_with("{\"value\":1}\n"), p.come());

@@ -4,14 +4,13 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/feed_log.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
 
 #include <boost/asio/steady_timer.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
@@ -131,7 +130,7 @@ BOOST_AUTO_TEST_CASE(a_request_to_publish_that_its_handler_refuses_publishes_not
     BOOST_TEST(peer.ask("UPDATE self:notice {\"error\":\"x\"}").starts_with(R"({"error":"bad_request")"));
 }
 
-BOOST_DATA_TEST_CASE(the_request_of_an_endless_handler_fails_at_its_deadline_and_it_is_told_to_stop, carriers, kind) {
+CLES_DATA_TEST_CASE(the_request_of_an_endless_handler_fails_at_its_deadline_and_it_is_told_to_stop, carriers, kind) {
     nodes n{kind};
     std::vector<cles::responder> kept;
     n.car->on_delegate("responder", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
@@ -160,7 +159,7 @@ BOOST_AUTO_TEST_CASE(the_peer_is_notified_that_the_deadline_has_passed) {
     BOOST_TEST(peer.line().starts_with(R"({"node")"));
 }
 
-BOOST_DATA_TEST_CASE(a_service_is_destroyed_while_its_handlers_still_run, carriers, kind) {
+CLES_DATA_TEST_CASE(a_service_is_destroyed_while_its_handlers_still_run, carriers, kind) {
     nodes n{kind};
     std::vector<cles::responder> kept;
     n.car->on_delegate("responder", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
@@ -181,7 +180,7 @@ BOOST_DATA_TEST_CASE(a_service_is_destroyed_while_its_handlers_still_run, carrie
     kept.front().fail(errc::failed, "nobody hears this");
 }
 
-BOOST_DATA_TEST_CASE(a_responder_that_is_dropped_has_failed_and_one_that_answers_twice_has_answered, carriers, kind) {
+CLES_DATA_TEST_CASE(a_responder_that_is_dropped_has_failed_and_one_that_answers_twice_has_answered, carriers, kind) {
     nodes n{kind};
     n.car->on_pull("dropped", [](const cles::request&, const cles::responder&) {});
     n.car->on_pull("twice", [](const cles::request&, cles::responder r) {
@@ -211,7 +210,7 @@ BOOST_AUTO_TEST_CASE(a_result_that_looks_like_a_failure_is_one) {
 
 // -- handlers that use their own service ---------------------------------------------------------------------------
 
-BOOST_DATA_TEST_CASE(a_plain_handler_asks_back_on_the_same_link, carriers, kind) {
+CLES_DATA_TEST_CASE(a_plain_handler_asks_back_on_the_same_link, carriers, kind) {
     nodes n{kind};
     n.tower.on_pull("name", [] { return "tower"; });
     answer<std::string> asked_back;
@@ -228,7 +227,7 @@ BOOST_DATA_TEST_CASE(a_plain_handler_asks_back_on_the_same_link, carriers, kind)
     BOOST_TEST(asked_back.value == "car1");
 }
 
-BOOST_DATA_TEST_CASE(a_plain_handler_publishes_registers_and_asks_while_it_runs, carriers, kind) {
+CLES_DATA_TEST_CASE(a_plain_handler_publishes_registers_and_asks_while_it_runs, carriers, kind) {
     nodes n{kind};
     feed_log feed;
     n.car->on_bind("log");
@@ -250,7 +249,7 @@ BOOST_DATA_TEST_CASE(a_plain_handler_publishes_registers_and_asks_while_it_runs,
     BOOST_TEST((feed.bodies() == std::vector<std::string>{R"({"value":"busy"})", R"({"value":"{}"})"}));
 }
 
-BOOST_DATA_TEST_CASE(a_plain_handler_may_stop_its_service, carriers, kind) {
+CLES_DATA_TEST_CASE(a_plain_handler_may_stop_its_service, carriers, kind) {
     nodes n{kind};
     std::string seen;
     n.car->on_push("stop", [&](const cles::request& r) {
@@ -268,7 +267,7 @@ BOOST_DATA_TEST_CASE(a_plain_handler_may_stop_its_service, carriers, kind) {
     BOOST_TEST(second.code == errc::unavailable);
 }
 
-BOOST_DATA_TEST_CASE(a_request_to_publish_may_stop_the_service, carriers, kind) {
+CLES_DATA_TEST_CASE(a_request_to_publish_may_stop_the_service, carriers, kind) {
     nodes n{kind};
     n.car->on_update("notice", [&](const cles::request&) { n.car->stop(); });
     answer<> a;
@@ -293,7 +292,7 @@ BOOST_AUTO_TEST_CASE(a_plain_handler_may_stop_the_service_that_asks_itself) {
 }
 
 // A completion handler is called from inside the service: it may destroy it.
-BOOST_DATA_TEST_CASE(a_completion_may_destroy_the_service_that_calls_it, carriers, kind) {
+CLES_DATA_TEST_CASE(a_completion_may_destroy_the_service_that_calls_it, carriers, kind) {
     nodes n{kind};
     n.car->on_pull("speed", [] { return 42; });
     auto asker = std::make_unique<cles::service>(n.io, knowing("asker", *n.car));

@@ -4,14 +4,13 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/feed_log.hpp"
 #include "support/impaired_path.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 
 #include <boost/asio/steady_timer.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
@@ -174,7 +173,7 @@ BOOST_AUTO_TEST_CASE(copies_are_byte_by_byte_the_same) {
     BOOST_TEST(left > 1000, seen[0]);
 }
 
-BOOST_DATA_TEST_CASE(feeds_report_what_was_lost_as_gaps, seeds, seed) {
+CLES_DATA_TEST_CASE(feeds_report_what_was_lost_as_gaps, seeds, seed) {
     asio::io_context io;
     network n{io, {}, seed};
     feed_log feed;
@@ -198,7 +197,7 @@ BOOST_DATA_TEST_CASE(feeds_report_what_was_lost_as_gaps, seeds, seed) {
     BOOST_TEST(feed.count(feed_event::update) + feed.missed() == count + 2U); // no duplicates, all accounted for
 }
 
-BOOST_DATA_TEST_CASE(updates_that_overtake_others_are_in_order_or_gaps, seeds, seed) {
+CLES_DATA_TEST_CASE(updates_that_overtake_others_are_in_order_or_gaps, seeds, seed) {
     asio::io_context io;
     network n{io, {.least_delay = 0ms, .most_delay = 20ms}, seed};
     feed_log feed;

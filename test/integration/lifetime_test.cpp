@@ -4,6 +4,7 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/feed_log.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
@@ -12,8 +13,6 @@
 
 #include <boost/asio/thread_pool.hpp>
 #include <boost/asio/use_future.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
@@ -43,7 +42,7 @@ void run_on(const asio::any_io_executor& executor, F f) {
     asio::post(executor, asio::use_future([&f] { f(); })).get();
 }
 
-BOOST_DATA_TEST_CASE(a_foreign_loop_polls, carriers, kind) {
+CLES_DATA_TEST_CASE(a_foreign_loop_polls, carriers, kind) {
     asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     car.on_pull("speed", [] { return 42; });
@@ -156,7 +155,7 @@ BOOST_AUTO_TEST_CASE(a_service_that_only_asks_leaves_its_context_without_work) {
     BOOST_TEST(io.stopped());
 }
 
-BOOST_DATA_TEST_CASE(a_stopped_service_leaves_its_context_without_work, carriers, kind) {
+CLES_DATA_TEST_CASE(a_stopped_service_leaves_its_context_without_work, carriers, kind) {
     asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     car.on_pull("speed", [] { return 42; });
@@ -173,7 +172,7 @@ BOOST_DATA_TEST_CASE(a_stopped_service_leaves_its_context_without_work, carriers
     BOOST_CHECK_NO_THROW(car.update("place", 1)); // without subscribers
 }
 
-BOOST_DATA_TEST_CASE(a_service_on_a_pool_takes_a_strand, carriers, kind) {
+CLES_DATA_TEST_CASE(a_service_on_a_pool_takes_a_strand, carriers, kind) {
     asio::thread_pool pool{4};
     cles::service car{pool, listening("car1", kind)};
     cles::service tower{pool, knowing("tower", car)};
@@ -228,7 +227,7 @@ BOOST_DATA_TEST_CASE(a_service_on_a_pool_takes_a_strand, carriers, kind) {
     pool.join();
 }
 
-BOOST_DATA_TEST_CASE(services_of_two_threads_talk, carriers, kind) {
+CLES_DATA_TEST_CASE(services_of_two_threads_talk, carriers, kind) {
     side_thread there;
     side_thread here;
     std::unique_ptr<cles::service> car;
@@ -294,7 +293,7 @@ struct remote_node {
     std::vector<std::unique_ptr<feed_log>> feeds;
 };
 
-BOOST_DATA_TEST_CASE(services_of_two_threads_bind_to_each_other_at_the_same_time, carriers, kind) {
+CLES_DATA_TEST_CASE(services_of_two_threads_bind_to_each_other_at_the_same_time, carriers, kind) {
     remote_node one{"one", kind};
     remote_node two{"two", kind};
     one.bind_many(two);
@@ -365,7 +364,7 @@ struct busy_nodes {
     std::unique_ptr<cles::service> tower;
 };
 
-BOOST_DATA_TEST_CASE(destroying_services_with_everything_in_flight_ends_it_all, carriers, kind) {
+CLES_DATA_TEST_CASE(destroying_services_with_everything_in_flight_ends_it_all, carriers, kind) {
     for (int turns = 0; turns < 60; turns += 3) {
         asio::io_context io;
         busy_nodes n{io, kind};
@@ -379,7 +378,7 @@ BOOST_DATA_TEST_CASE(destroying_services_with_everything_in_flight_ends_it_all, 
     }
 }
 
-BOOST_DATA_TEST_CASE(destroying_the_publisher_first_ends_all_but_the_feeds, carriers, kind) {
+CLES_DATA_TEST_CASE(destroying_the_publisher_first_ends_all_but_the_feeds, carriers, kind) {
     for (int turns = 0; turns < 60; turns += 7) {
         asio::io_context io;
         busy_nodes n{io, kind};
@@ -393,7 +392,7 @@ BOOST_DATA_TEST_CASE(destroying_the_publisher_first_ends_all_but_the_feeds, carr
     }
 }
 
-BOOST_DATA_TEST_CASE(a_context_may_go_with_everything_in_flight, carriers, kind) {
+CLES_DATA_TEST_CASE(a_context_may_go_with_everything_in_flight, carriers, kind) {
     for (int turns = 0; turns < 60; turns += 7) {
         auto io = std::make_unique<asio::io_context>();
         auto n = std::make_unique<busy_nodes>(*io, kind);
@@ -407,7 +406,7 @@ BOOST_DATA_TEST_CASE(a_context_may_go_with_everything_in_flight, carriers, kind)
 }
 
 // Of two connected services, the one whose context belongs to the host program may be destroyed with it at any moment.
-BOOST_DATA_TEST_CASE(a_peers_context_may_go_first, carriers, kind) {
+CLES_DATA_TEST_CASE(a_peers_context_may_go_first, carriers, kind) {
     for (int turns = 0; turns < 12; ++turns) {
         asio::io_context io;
         cles::service car{io, listening("car1", kind)};
@@ -431,7 +430,7 @@ BOOST_DATA_TEST_CASE(a_peers_context_may_go_first, carriers, kind) {
     }
 }
 
-BOOST_DATA_TEST_CASE(a_publishers_context_may_go_first, carriers, kind) {
+CLES_DATA_TEST_CASE(a_publishers_context_may_go_first, carriers, kind) {
     for (int turns = 0; turns < 12; ++turns) {
         asio::io_context io;
         auto other = std::make_unique<asio::io_context>();
@@ -453,7 +452,7 @@ BOOST_DATA_TEST_CASE(a_publishers_context_may_go_first, carriers, kind) {
     }
 }
 
-BOOST_DATA_TEST_CASE(stopping_twice_and_asking_a_stopped_service_fails_with_stopped, carriers, kind) {
+CLES_DATA_TEST_CASE(stopping_twice_and_asking_a_stopped_service_fails_with_stopped, carriers, kind) {
     asio::io_context io;
     busy_nodes n{io, kind};
     n.tower->stop();
@@ -471,7 +470,7 @@ BOOST_DATA_TEST_CASE(stopping_twice_and_asking_a_stopped_service_fails_with_stop
 }
 
 // Replies are sent before the end if the peer accepts them at once.
-BOOST_DATA_TEST_CASE(a_stop_sends_what_was_answered, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_stop_sends_what_was_answered, every_socket, kind) {
     asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     std::vector<cles::responder> jobs;

@@ -4,6 +4,7 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/metric.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
@@ -12,10 +13,9 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/read_until.hpp>
 #include <boost/asio/write.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -31,7 +31,7 @@ using namespace std::chrono_literals;
 namespace asio = boost::asio;
 using cles::errc;
 
-const auto tcp_and_unix = boost::unit_test::data::make({carrier::tcp4, carrier::unix_abstract});
+constexpr std::array tcp_and_unix{carrier::tcp4, carrier::unix_abstract};
 
 struct node {
     explicit node(carrier kind = carrier::tcp4, const cles::limits& bounds = {})
@@ -57,7 +57,7 @@ bool is_busy(const std::string& line) { return line.starts_with(R"({"error":"bus
 // -- peers that vanish ---------------------------------------------------------------------------------------------
 
 // The system still accepts such a connection, but can no longer tell the peer's address.
-BOOST_DATA_TEST_CASE(a_peer_that_disconnects_before_it_is_accepted_is_harmless, tcp_and_unix, kind) {
+CLES_DATA_TEST_CASE(a_peer_that_disconnects_before_it_is_accepted_is_harmless, tcp_and_unix, kind) {
     node n{kind};
     n.own = n.metric("links_open");
     for (int i = 0; i < 20; ++i) {
@@ -69,7 +69,7 @@ BOOST_DATA_TEST_CASE(a_peer_that_disconnects_before_it_is_accepted_is_harmless, 
     run_until(n.io, [&] { return n.open() == 0; });
 }
 
-BOOST_DATA_TEST_CASE(links_that_close_free_capacity_and_end_their_bindings, tcp_and_unix, kind) {
+CLES_DATA_TEST_CASE(links_that_close_free_capacity_and_end_their_bindings, tcp_and_unix, kind) {
     node n{kind, {.nouns = 50, .probe = 20ms}};
     n.own = n.metric("links_open");
     for (int i = 0; i < 1100; ++i) {
@@ -141,7 +141,7 @@ BOOST_AUTO_TEST_CASE(a_unix_peer_that_hangs_up_is_noticed_without_a_probe) {
         n.io, [&] { return n.jobs.front().stopped(); }, 3s);
 }
 
-BOOST_DATA_TEST_CASE(at_the_limit_the_oldest_half_closed_link_is_evicted, tcp_and_unix, kind) {
+CLES_DATA_TEST_CASE(at_the_limit_the_oldest_half_closed_link_is_evicted, tcp_and_unix, kind) {
     node n{kind, {.links = 3}};
     std::vector<scripted_peer> peers;
     for (int i = 0; i < 3; ++i) {
@@ -163,7 +163,7 @@ BOOST_DATA_TEST_CASE(at_the_limit_the_oldest_half_closed_link_is_evicted, tcp_an
 
 // -- silent peers --------------------------------------------------------------------------------------------------
 
-BOOST_DATA_TEST_CASE(a_link_that_brings_no_whole_line_in_time_is_closed, tcp_and_unix, kind) {
+CLES_DATA_TEST_CASE(a_link_that_brings_no_whole_line_in_time_is_closed, tcp_and_unix, kind) {
     node n{kind, {.links = 3, .first_line = 50ms}};
     auto silent = n.peer();
     auto drips = n.peer();
@@ -221,7 +221,7 @@ BOOST_AUTO_TEST_CASE(an_address_beyond_its_share_gives_way_to_another) {
 
 // -- nodes at their limit ------------------------------------------------------------------------------------------
 
-BOOST_DATA_TEST_CASE(a_refused_peer_receives_the_line_independently_of_its_input, tcp_and_unix, kind) {
+CLES_DATA_TEST_CASE(a_refused_peer_receives_the_line_independently_of_its_input, tcp_and_unix, kind) {
     node n{kind, {.links = 1}};
     auto inside = n.peer();
     BOOST_TEST(inside.ask("BIND self:notice") == "{}");
@@ -234,7 +234,7 @@ BOOST_DATA_TEST_CASE(a_refused_peer_receives_the_line_independently_of_its_input
     }
 }
 
-BOOST_DATA_TEST_CASE(a_request_to_a_node_at_its_limit_of_links_is_busy, tcp_and_unix, kind) {
+CLES_DATA_TEST_CASE(a_request_to_a_node_at_its_limit_of_links_is_busy, tcp_and_unix, kind) {
     node n{kind, {.links = 1}};
     auto inside = n.peer();
     BOOST_TEST(inside.ask("BIND self:notice") == "{}");

@@ -4,6 +4,7 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/feed_log.hpp"
 #include "support/metric.hpp"
 #include "support/node.hpp"
@@ -11,8 +12,6 @@
 #include "support/scripted_peer.hpp"
 
 #include <boost/asio/ip/tcp.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
@@ -36,7 +35,7 @@ constexpr std::size_t budget = 16 * large;
 
 std::uint64_t memory(cles::service& of, const std::string& name) { return metric(of, name, "memory"); }
 
-BOOST_DATA_TEST_CASE(many_large_unread_results_stay_within_it, every_socket, kind) {
+CLES_DATA_TEST_CASE(many_large_unread_results_stay_within_it, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind, {.memory = budget})};
     std::vector<cles::responder> asked;

@@ -3,13 +3,12 @@
 
 #include <cles/service.hpp>
 
+#include "support/data_test_case.hpp"
 #include "support/localization.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
 
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
@@ -45,7 +44,7 @@ bool is_failure(const std::string& reply, const std::string& code) {
     return reply.find("{\"error\":\"" + code + "\",\"message\":\"") != std::string::npos;
 }
 
-BOOST_DATA_TEST_CASE(a_line_gets_a_line, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_line_gets_a_line, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     BOOST_TEST(peer.ask("PULL car1:speed") == R"({"value":42})");
@@ -59,7 +58,7 @@ BOOST_DATA_TEST_CASE(a_line_gets_a_line, every_socket, kind) {
     BOOST_TEST(peer.ask("PULL self:cles").starts_with(R"({"node":"car1",)"));
 }
 
-BOOST_DATA_TEST_CASE(requests_without_id_are_answered_in_order_and_those_with_id_when_ready, every_socket, kind) {
+CLES_DATA_TEST_CASE(requests_without_id_are_answered_in_order_and_those_with_id_when_ready, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     peer.send("DELEGATE self:drive\nPULL self:speed\nDELEGATE self:drive id=3\nPULL self:speed id=4\n");
@@ -72,7 +71,7 @@ BOOST_DATA_TEST_CASE(requests_without_id_are_answered_in_order_and_those_with_id
     BOOST_TEST(peer.line() == R"({"value":42})");
 }
 
-BOOST_DATA_TEST_CASE(bytes_one_at_a_time_are_a_request_too, every_socket, kind) {
+CLES_DATA_TEST_CASE(bytes_one_at_a_time_are_a_request_too, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     for (const char byte : std::string{"PUSH self:echo id=1 {\"x\":\"\xC3\xA4\"}\r\n"}) {
@@ -83,7 +82,7 @@ BOOST_DATA_TEST_CASE(bytes_one_at_a_time_are_a_request_too, every_socket, kind) 
     BOOST_TEST(peer.line() == "id=1 {\"x\":\"\xC3\xA4\"}");
 }
 
-BOOST_DATA_TEST_CASE(after_a_half_close_all_is_answered_and_then_the_link_ends, every_socket, kind) {
+CLES_DATA_TEST_CASE(after_a_half_close_all_is_answered_and_then_the_link_ends, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     peer.send("PULL self:speed\nDELEGATE self:drive\nPULL self:speed\n");
@@ -96,7 +95,7 @@ BOOST_DATA_TEST_CASE(after_a_half_close_all_is_answered_and_then_the_link_ends, 
     BOOST_TEST(!peer.was_reset());
 }
 
-BOOST_DATA_TEST_CASE(a_half_close_withdraws_requests_with_an_id, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_half_close_withdraws_requests_with_an_id, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     peer.send("DELEGATE self:drive id=5\n");
@@ -108,7 +107,7 @@ BOOST_DATA_TEST_CASE(a_half_close_withdraws_requests_with_an_id, every_socket, k
     BOOST_TEST((said.empty() || is_failure(said, "cancelled")), said);
 }
 
-BOOST_DATA_TEST_CASE(a_reset_withdraws_everything, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_reset_withdraws_everything, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     BOOST_TEST(!peer.ask("PULL self:speed").empty());
@@ -120,7 +119,7 @@ BOOST_DATA_TEST_CASE(a_reset_withdraws_everything, every_socket, kind) {
     BOOST_TEST(n.serves());
 }
 
-BOOST_DATA_TEST_CASE(a_binding_remains_after_a_half_close_until_a_write_fails, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_binding_remains_after_a_half_close_until_a_write_fails, every_socket, kind) {
     node n{kind};
     n.car.update("place", 1);
     auto peer = n.peer();
@@ -136,7 +135,7 @@ BOOST_DATA_TEST_CASE(a_binding_remains_after_a_half_close_until_a_write_fails, e
 
 // -- malformed lines in sequence: each gets its error, and the link stays open -------------------------------------
 
-BOOST_DATA_TEST_CASE(malformed_lines_are_reported_and_affect_nothing_else, every_socket, kind) {
+CLES_DATA_TEST_CASE(malformed_lines_are_reported_and_affect_nothing_else, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     const std::string deep = std::string(33, '[') + std::string(33, ']');
@@ -179,7 +178,7 @@ BOOST_DATA_TEST_CASE(malformed_lines_are_reported_and_affect_nothing_else, every
     BOOST_TEST(n.serves());
 }
 
-BOOST_DATA_TEST_CASE(a_number_that_does_not_fit_is_reported_with_its_position, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_number_that_does_not_fit_is_reported_with_its_position, every_socket, kind) {
     node n{kind};
     n.car.on_push("small", [](std::uint8_t value) { return value; });
     n.car.on_push("whole", [](std::int64_t value) { return value; });
@@ -202,7 +201,7 @@ BOOST_DATA_TEST_CASE(a_number_that_does_not_fit_is_reported_with_its_position, e
     BOOST_TEST(parameter == R"({"value":42})"); // its handler does not read it
 }
 
-BOOST_DATA_TEST_CASE(a_malformed_line_is_answered_with_its_id, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_malformed_line_is_answered_with_its_id, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     BOOST_TEST(peer.ask("PUSH car1:echo id=12 {\"a\":}").starts_with("id=12 {\"error\":\"bad_request\""));
@@ -215,14 +214,14 @@ BOOST_DATA_TEST_CASE(a_malformed_line_is_answered_with_its_id, every_socket, kin
     BOOST_TEST(is_failure(peer.line(), "bad_request"));
 }
 
-BOOST_DATA_TEST_CASE(replies_to_nothing_are_never_answered, every_socket, kind) {
+CLES_DATA_TEST_CASE(replies_to_nothing_are_never_answered, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     peer.send("{\"a\":1}\n[1]\nid=77 {}\nid=0 {}\nid=x\n{broken\nUPDATE car9:place seq=1 epoch=00000000 {}\n");
     BOOST_TEST(peer.ask("PULL car1:speed") == R"({"value":42})");
 }
 
-BOOST_DATA_TEST_CASE(an_id_that_is_in_flight_closes_the_link, every_socket, kind) {
+CLES_DATA_TEST_CASE(an_id_that_is_in_flight_closes_the_link, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     peer.send("DELEGATE self:drive id=1\nDELEGATE self:drive id=1\nPULL self:speed\n");
@@ -233,7 +232,7 @@ BOOST_DATA_TEST_CASE(an_id_that_is_in_flight_closes_the_link, every_socket, kind
     BOOST_TEST(n.serves());
 }
 
-BOOST_DATA_TEST_CASE(a_line_over_the_limit_is_too_large_and_ends_the_link, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_line_over_the_limit_is_too_large_and_ends_the_link, every_socket, kind) {
     node n{kind, {.line = 2000, .discard = 100ms}};
     auto peer = n.peer();
     peer.send("PULL car1:speed\nPUSH car1:echo id=4 {\"a\":\"" + std::string(2000, 'x') + "\"}\nPULL car1:speed\n");
@@ -245,7 +244,7 @@ BOOST_DATA_TEST_CASE(a_line_over_the_limit_is_too_large_and_ends_the_link, every
     BOOST_TEST(n.serves());
 }
 
-BOOST_DATA_TEST_CASE(an_endless_line_is_too_large_and_is_not_kept, every_socket, kind) {
+CLES_DATA_TEST_CASE(an_endless_line_is_too_large_and_is_not_kept, every_socket, kind) {
     node n{kind, {.line = 2000, .discard = 100ms}};
     auto peer = n.peer();
     const std::string piece(10000, 'x');
@@ -263,7 +262,7 @@ BOOST_DATA_TEST_CASE(an_endless_line_is_too_large_and_is_not_kept, every_socket,
     BOOST_TEST(n.serves());
 }
 
-BOOST_DATA_TEST_CASE(a_web_page_that_posts_is_turned_away_unanswered, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_web_page_that_posts_is_turned_away_unanswered, every_socket, kind) {
     node n{kind};
     for (const auto* text :
          {"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nPUSH self:echo {}\r\n", "GET /x HTTP/1.0\r\n\r\nPULL self:speed\n",
@@ -277,7 +276,7 @@ BOOST_DATA_TEST_CASE(a_web_page_that_posts_is_turned_away_unanswered, every_sock
     BOOST_TEST(n.serves());
 }
 
-BOOST_DATA_TEST_CASE(a_reply_over_the_limit_reports_that_the_handler_ran, every_socket, kind) {
+CLES_DATA_TEST_CASE(a_reply_over_the_limit_reports_that_the_handler_ran, every_socket, kind) {
     node n{kind, {.line = 1000}};
     n.car.on_pull("much", [] { return std::string(1000, 'x'); });
     auto peer = n.peer();
@@ -287,7 +286,7 @@ BOOST_DATA_TEST_CASE(a_reply_over_the_limit_reports_that_the_handler_ran, every_
     BOOST_TEST(peer.ask("PULL self:speed") == R"({"value":42})");
 }
 
-BOOST_DATA_TEST_CASE(cancel_withdraws_by_id, every_socket, kind) {
+CLES_DATA_TEST_CASE(cancel_withdraws_by_id, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     peer.send("DELEGATE self:drive id=21 progress=yes\n");

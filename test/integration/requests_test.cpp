@@ -4,14 +4,13 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/localization.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
 
 #include <boost/asio/error.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
@@ -57,7 +56,7 @@ struct two_nodes {
     cles::service tower;
 };
 
-BOOST_DATA_TEST_CASE(what_is_urgent_does_not_wait_behind_large_answers, carriers, kind) {
+CLES_DATA_TEST_CASE(what_is_urgent_does_not_wait_behind_large_answers, carriers, kind) {
     two_nodes n{kind};
     n.car.on_pull("map", [] { return std::string(900'000, 'x'); });
     constexpr std::size_t count = 20;
@@ -74,7 +73,7 @@ BOOST_DATA_TEST_CASE(what_is_urgent_does_not_wait_behind_large_answers, carriers
     BOOST_TEST(large.back().value.text.size() > 900'000U);
 }
 
-BOOST_DATA_TEST_CASE(pull_gives_data_typed_and_raw, carriers, kind) {
+CLES_DATA_TEST_CASE(pull_gives_data_typed_and_raw, carriers, kind) {
     two_nodes n{kind};
     answer<localization> typed;
     answer<> raw;
@@ -90,7 +89,7 @@ BOOST_DATA_TEST_CASE(pull_gives_data_typed_and_raw, carriers, kind) {
     BOOST_TEST(typed.calls == 1);
 }
 
-BOOST_DATA_TEST_CASE(parameters_cross_decoded, carriers, kind) {
+CLES_DATA_TEST_CASE(parameters_cross_decoded, carriers, kind) {
     two_nodes n{kind};
     answer<std::vector<std::string>> echoed;
     n.tower.async_pull<std::vector<std::string>>("car1:echo/a%20b/%C3%A4/1.5", echoed.take());
@@ -98,7 +97,7 @@ BOOST_DATA_TEST_CASE(parameters_cross_decoded, carriers, kind) {
     BOOST_TEST((echoed.value == std::vector<std::string>{"a b", "\xC3\xA4", "1.5"}));
 }
 
-BOOST_DATA_TEST_CASE(push_sends_data_typed_and_raw, carriers, kind) {
+CLES_DATA_TEST_CASE(push_sends_data_typed_and_raw, carriers, kind) {
     two_nodes n{kind};
     answer<> typed;
     answer<> raw;
@@ -111,7 +110,7 @@ BOOST_DATA_TEST_CASE(push_sends_data_typed_and_raw, carriers, kind) {
     BOOST_TEST(raw.value.text == R"({"a":[1,2]})");
 }
 
-BOOST_DATA_TEST_CASE(delegate_reports_progress_and_gives_the_result, carriers, kind) {
+CLES_DATA_TEST_CASE(delegate_reports_progress_and_gives_the_result, carriers, kind) {
     two_nodes n{kind};
     answer<> result;
     std::vector<std::pair<double, std::string>> reports;
@@ -133,7 +132,7 @@ BOOST_DATA_TEST_CASE(delegate_reports_progress_and_gives_the_result, carriers, k
     BOOST_TEST(reports[2].first == 0.5);
 }
 
-BOOST_DATA_TEST_CASE(update_asks_the_other_to_publish, carriers, kind) {
+CLES_DATA_TEST_CASE(update_asks_the_other_to_publish, carriers, kind) {
     two_nodes n{kind};
     answer<> asked;
     answer<> refused;
@@ -145,7 +144,7 @@ BOOST_DATA_TEST_CASE(update_asks_the_other_to_publish, carriers, kind) {
     BOOST_TEST(refused.code == errc::no_task);
 }
 
-BOOST_DATA_TEST_CASE(a_command_is_a_sentence_of_the_language, carriers, kind) {
+CLES_DATA_TEST_CASE(a_command_is_a_sentence_of_the_language, carriers, kind) {
     two_nodes n{kind};
     answer<> pulled;
     answer<> pushed;
@@ -163,7 +162,7 @@ BOOST_DATA_TEST_CASE(a_command_is_a_sentence_of_the_language, carriers, kind) {
     BOOST_TEST(pushed.value.text == R"({"x":"y"})");
 }
 
-BOOST_DATA_TEST_CASE(many_requests_in_flight_are_each_answered_once, carriers, kind) {
+CLES_DATA_TEST_CASE(many_requests_in_flight_are_each_answered_once, carriers, kind) {
     two_nodes n{kind};
     constexpr std::size_t count = 2000;
     std::vector<answer<std::vector<std::string>>> all(count);
@@ -177,7 +176,7 @@ BOOST_DATA_TEST_CASE(many_requests_in_flight_are_each_answered_once, carriers, k
     }
 }
 
-BOOST_DATA_TEST_CASE(failures_contain_the_peers_message, carriers, kind) {
+CLES_DATA_TEST_CASE(failures_contain_the_peers_message, carriers, kind) {
     two_nodes n{kind};
     answer<> unknown_task;
     answer<> wrong_body;
@@ -195,7 +194,7 @@ BOOST_DATA_TEST_CASE(failures_contain_the_peers_message, carriers, kind) {
     BOOST_TEST(wrong_type.words.find("utc") != std::string::npos, wrong_type.words);
 }
 
-BOOST_DATA_TEST_CASE(a_deadline_ends_the_request_at_both_ends, carriers, kind) {
+CLES_DATA_TEST_CASE(a_deadline_ends_the_request_at_both_ends, carriers, kind) {
     two_nodes n{kind};
     answer<> late;
     bool stopped = false;
@@ -213,7 +212,7 @@ BOOST_DATA_TEST_CASE(a_deadline_ends_the_request_at_both_ends, carriers, kind) {
     BOOST_TEST(late.calls == 1);
 }
 
-BOOST_DATA_TEST_CASE(a_cancellation_slot_withdraws_at_the_peer, carriers, kind) {
+CLES_DATA_TEST_CASE(a_cancellation_slot_withdraws_at_the_peer, carriers, kind) {
     two_nodes n{kind};
     answer<> withdrawn;
     boost::asio::cancellation_signal signal;
@@ -232,7 +231,7 @@ BOOST_DATA_TEST_CASE(a_cancellation_slot_withdraws_at_the_peer, carriers, kind) 
     BOOST_TEST(withdrawn.calls == 1);
 }
 
-BOOST_DATA_TEST_CASE(a_lost_link_fails_what_is_in_flight_at_once, carriers, kind) {
+CLES_DATA_TEST_CASE(a_lost_link_fails_what_is_in_flight_at_once, carriers, kind) {
     two_nodes n{kind};
     answer<> lost;
     n.tower.async_delegate("car1:drive", cles::json_text{}, lost.options(), lost.take());
@@ -244,7 +243,7 @@ BOOST_DATA_TEST_CASE(a_lost_link_fails_what_is_in_flight_at_once, carriers, kind
     BOOST_TEST(n.job->stopped());
 }
 
-BOOST_DATA_TEST_CASE(connect_refused_is_the_systems_error_at_once, carriers, kind) {
+CLES_DATA_TEST_CASE(connect_refused_is_the_systems_error_at_once, carriers, kind) {
     two_nodes n{kind};
     n.car.stop();
     answer<> refused;
@@ -257,7 +256,7 @@ BOOST_DATA_TEST_CASE(connect_refused_is_the_systems_error_at_once, carriers, kin
     BOOST_TEST(refused.words.starts_with("cannot connect to "), refused.words);
 }
 
-BOOST_DATA_TEST_CASE(the_next_request_after_a_loss_makes_a_new_link, carriers, kind) {
+CLES_DATA_TEST_CASE(the_next_request_after_a_loss_makes_a_new_link, carriers, kind) {
     two_nodes n{kind};
     answer<int> first;
     n.tower.async_pull<int>("car1:speed", first.take());
@@ -346,7 +345,7 @@ BOOST_AUTO_TEST_CASE(set_peer_changes_the_address_of_a_node) {
 }
 
 // As with Asio's own operations: an exception from a handler leaves the context's run, and affects nothing else.
-BOOST_DATA_TEST_CASE(a_completion_handler_that_throws_affects_no_other, carriers, kind) {
+CLES_DATA_TEST_CASE(a_completion_handler_that_throws_affects_no_other, carriers, kind) {
     two_nodes n{kind};
     struct thrown_by_test {};
     int thrown = 0;

@@ -5,13 +5,12 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/node.hpp"
 #include "support/side_thread.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <array>
@@ -31,7 +30,7 @@ namespace asio = boost::asio;
 
 constexpr std::array<std::chrono::microseconds, 2> bounds{0us, 50us};
 
-BOOST_DATA_TEST_CASE(ends_when_the_context_is_out_of_work, bounds, bound) {
+CLES_DATA_TEST_CASE(ends_when_the_context_is_out_of_work, bounds, bound) {
     asio::io_context io;
     int ran = 0;
     asio::post(io, [&] { asio::post(io, [&] { ++ran; }); });
@@ -40,7 +39,7 @@ BOOST_DATA_TEST_CASE(ends_when_the_context_is_out_of_work, bounds, bound) {
     BOOST_TEST(cles::run(io, {.busy_poll = bound}) == 0U); // stopped, until it is restarted
 }
 
-BOOST_DATA_TEST_CASE(ends_when_the_context_is_stopped, bounds, bound) {
+CLES_DATA_TEST_CASE(ends_when_the_context_is_stopped, bounds, bound) {
     asio::io_context io;
     const auto busy = asio::make_work_guard(io);
     asio::steady_timer timer{io, 20ms}; // longer than it polls for work
@@ -49,7 +48,7 @@ BOOST_DATA_TEST_CASE(ends_when_the_context_is_stopped, bounds, bound) {
     BOOST_TEST(io.stopped());
 }
 
-BOOST_DATA_TEST_CASE(lets_out_what_a_handler_throws_and_goes_on_when_called_again, bounds, bound) {
+CLES_DATA_TEST_CASE(lets_out_what_a_handler_throws_and_goes_on_when_called_again, bounds, bound) {
     asio::io_context io;
     int ran = 0;
     asio::post(io, [] { throw std::runtime_error("a handler's"); });
@@ -82,7 +81,7 @@ BOOST_AUTO_TEST_CASE(a_priority_that_does_not_exist_is_refused_before_anything_r
     BOOST_TEST(!ran);
 }
 
-BOOST_DATA_TEST_CASE(serves_a_peer, bounds, bound) {
+CLES_DATA_TEST_CASE(serves_a_peer, bounds, bound) {
     side_thread there;
     std::unique_ptr<cles::service> car;
     there.run([&] {

@@ -4,6 +4,7 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/feed_log.hpp"
 #include "support/impaired_path.hpp"
 #include "support/localization.hpp"
@@ -14,8 +15,6 @@
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/udp.hpp>
-#include <boost/test/data/monomorphic.hpp>
-#include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <array>
@@ -95,7 +94,7 @@ struct nodes {
     std::unique_ptr<cles::service> tower;
 };
 
-BOOST_DATA_TEST_CASE(all_five_verbs_cross, every_datagram, kind) {
+CLES_DATA_TEST_CASE(all_five_verbs_cross, every_datagram, kind) {
     nodes n{kind};
     answer<localization> pulled;
     answer<int> pushed;

@@ -5,6 +5,7 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/data_test_case.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
@@ -134,7 +135,7 @@ BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_de
     }
 }
 
-BOOST_DATA_TEST_CASE(a_publisher_that_waits_may_do_anything, data::make(every_deed), does) {
+CLES_DATA_TEST_CASE(a_publisher_that_waits_may_do_anything, every_deed, does) {
     for (const auto where : {place::reply, place::cancelled, place::stop}) {
         BOOST_TEST_CONTEXT("at " << where) {
             world w;
@@ -165,7 +166,7 @@ BOOST_DATA_TEST_CASE(a_publisher_that_waits_may_do_anything, data::make(every_de
     }
 }
 
-BOOST_DATA_TEST_CASE(a_progress_function_may_do_anything, data::make(every_deed), does) {
+CLES_DATA_TEST_CASE(a_progress_function_may_do_anything, every_deed, does) {
     world w;
     int reports = 0;
     answer<int> a;
@@ -247,7 +248,7 @@ BOOST_DATA_TEST_CASE(a_progress_callback_may_act_when_it_is_destroyed, data::mak
     }
 }
 
-BOOST_DATA_TEST_CASE(a_stop_callback_may_do_anything, data::make(every_deed), does) {
+CLES_DATA_TEST_CASE(a_stop_callback_may_do_anything, every_deed, does) {
     for (const auto where : {place::deadline, place::lost, place::cancelled, place::stop}) {
         BOOST_TEST_CONTEXT("at " << where) {
             world w;
@@ -281,7 +282,7 @@ BOOST_DATA_TEST_CASE(a_stop_callback_may_do_anything, data::make(every_deed), do
 }
 
 // An exception from a handler becomes its reply; the lines after it are served.
-BOOST_DATA_TEST_CASE(a_handler_for_requests_may_do_anything, data::make(every_deed), does) {
+CLES_DATA_TEST_CASE(a_handler_for_requests_may_do_anything, every_deed, does) {
     for (const auto* task : acting) {
         BOOST_TEST_CONTEXT(task) {
             world w;
@@ -378,7 +379,7 @@ BOOST_DATA_TEST_CASE(a_service_that_is_stopped_while_it_chooses_begins_nothing,
 }
 
 // The functions that return something to the library.
-BOOST_DATA_TEST_CASE(the_functions_of_the_options_may_do_anything, data::make(every_deed), does) {
+CLES_DATA_TEST_CASE(the_functions_of_the_options_may_do_anything, every_deed, does) {
     for (const std::string which : {"authorise", "load", "metrics", "log"}) {
         BOOST_TEST_CONTEXT(which) {
             world* within = nullptr;
@@ -447,7 +448,7 @@ BOOST_DATA_TEST_CASE(the_functions_of_the_options_may_do_anything, data::make(ev
 }
 
 // Links that are closed at the same time, each with an entry of the log.
-BOOST_DATA_TEST_CASE(the_log_of_a_deadline_may_do_anything, data::make(every_deed), does) {
+CLES_DATA_TEST_CASE(the_log_of_a_deadline_may_do_anything, every_deed, does) {
     for (const bool stalled : {false, true}) {
         BOOST_TEST_CONTEXT((stalled ? "stalled" : "silent")) {
             world* within = nullptr;
