@@ -18,9 +18,8 @@ bool direct_links::allows(std::string_view node, const membership& others) const
     return contains(allowed_, node) && (run == nullptr || contains(run->announced.links, own_name_));
 }
 
-bool direct_links::is_lost(const failure& f, std::string_view node, const membership& others) {
-    const auto* const run = others.owner(node);
-    return f.alive || (run != nullptr && run->last_seen > f.first);
+bool direct_links::is_lost(const failure& f, const incarnation* owner) {
+    return f.alive || (owner != nullptr && owner->last_seen > f.first);
 }
 
 const direct_links::failure* direct_links::find_failure(std::string_view node) const noexcept {
@@ -32,8 +31,12 @@ direct_links::state direct_links::state_of(std::string_view node, const membersh
     if (!contains(allowed_, node)) { // most nodes, where only neighbours are
         return state::none;
     }
-    const auto where = others.address_of(node);
-    if (!where || where->empty() || !allows(node, others)) {
+    const auto* const owner = others.owner(node);
+    return owner != nullptr ? state_of(node, *owner) : state::none;
+}
+
+direct_links::state direct_links::state_of(std::string_view node, const incarnation& owner) const {
+    if (!contains(allowed_, node) || owner.where().empty() || !contains(owner.announced.links, own_name_)) {
         return state::none;
     }
     const auto at = tried_.find(node);
@@ -41,7 +44,7 @@ direct_links::state direct_links::state_of(std::string_view node, const membersh
         return state::untried;
     }
     const auto& failed = at->second;
-    return !failed ? state::open : is_lost(*failed, node, others) ? state::lost : state::silent;
+    return !failed ? state::open : is_lost(*failed, &owner) ? state::lost : state::silent;
 }
 
 time_point direct_links::failed_at(std::string_view node) const {
@@ -75,7 +78,7 @@ void direct_links::on_alive(std::string_view node) {
 std::vector<std::string> direct_links::take_lost(const membership& others) {
     std::vector<std::string> found;
     for (auto& [node, failed] : tried_) {
-        if (failed && !failed->is_reported && is_lost(*failed, node, others)) {
+        if (failed && !failed->is_reported && is_lost(*failed, others.owner(node))) {
             failed->is_reported = true;
             found.push_back(node);
         }

@@ -44,6 +44,8 @@ class direct_links {
         lost,    ///< an attempt has failed, and the node is alive
     };
     [[nodiscard]] state state_of(std::string_view node, const membership& others) const;
+    /// The same for the owner of that name, without looking for it.
+    [[nodiscard]] state state_of(std::string_view node, const incarnation& owner) const;
     /// When the first attempt failed, of a link that is silent or lost.
     [[nodiscard]] time_point failed_at(std::string_view node) const;
     /// Whether it is time for another attempt, of a link that is silent or lost.
@@ -68,7 +70,7 @@ class direct_links {
         bool alive = false;
         bool is_reported = false;
     };
-    [[nodiscard]] static bool is_lost(const failure& f, std::string_view node, const membership& others);
+    [[nodiscard]] static bool is_lost(const failure& f, const incarnation* owner);
     /// Null unless an attempt has failed.
     [[nodiscard]] const failure* find_failure(std::string_view node) const noexcept;
 

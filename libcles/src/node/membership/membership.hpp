@@ -162,6 +162,15 @@ class membership final : private deadline {
             what(member_of(one));
         }
     }
+    /// Calls `what` with the name and the owner of each node that is not suspect.
+    template <class F>
+    void for_each_live(F&& what) const {
+        for (const auto& [name, one] : peers_) {
+            if (!one.suspect) {
+                what(name, one.owner);
+            }
+        }
+    }
 
     /// The entries to report that are newer than `revision`, in order.
     [[nodiscard]] std::vector<delta_entry> deltas_since(std::uint64_t revision, time_point now) const;

@@ -36,10 +36,8 @@ void reachability::allow_only(std::vector<std::string> nodes) {
     }
 }
 
-bool reachability::is_direct(std::string_view node) const {
-    using enum direct_links::state;
-    const auto now = direct_.state_of(node, others_);
-    return now != none && now != lost;
+bool reachability::is_direct(direct_links::state now) noexcept {
+    return now != direct_links::state::none && now != direct_links::state::lost;
 }
 
 bool reachability::is_usable(std::string_view neighbour) const {
@@ -137,9 +135,9 @@ unsigned reachability::own_need(time_point now) const {
         return everywhere;
     }
     unsigned need = 0;
-    others_.for_each([&](const membership::member& k) {
-        if (need < everywhere && !k.suspect && !k.where.empty() && !is_direct(k.node)) {
-            const bool lasts = !allows(k.node) || direct_.failed_at(k.node) <= now - interval() * intervals_of_need;
+    others_.for_each_live([&](const std::string& node, const incarnation& owner) {
+        if (need < everywhere && !is_direct(direct_.state_of(node, owner)) && !owner.where().empty()) {
+            const bool lasts = !allows(node) || direct_.failed_at(node) <= now - interval() * intervals_of_need;
             need = lasts ? everywhere : 1;
         }
     });

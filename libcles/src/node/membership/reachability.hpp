@@ -126,7 +126,8 @@ class reachability {
     [[nodiscard]] std::chrono::milliseconds interval() const noexcept { return interval_among(others_.size()); }
     [[nodiscard]] unsigned own_need(time_point now) const;
     /// Whether requests for the node are sent straight to it. If it does not reply, it may have crashed.
-    [[nodiscard]] bool is_direct(std::string_view node) const;
+    [[nodiscard]] bool is_direct(std::string_view node) const { return is_direct(direct_.state_of(node, others_)); }
+    [[nodiscard]] static bool is_direct(direct_links::state now) noexcept;
     void leave(std::string_view neighbour);
     void apply(const peer_table& table);
     void apply(const std::string& name, std::uint32_t epoch, std::string_view neighbour, route_advert advert,
