@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulated_nats.hpp"
+#include "support/amount.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -151,8 +152,7 @@ class run {
 BOOST_AUTO_TEST_SUITE(bridge_faults)
 
 BOOST_AUTO_TEST_CASE(no_effect_happens_twice_whatever_is_lost) {
-    // With a sanitizer, a part of the seeds.
-    for (std::uint32_t seed = 1; seed <= (CLES_SIMULATION_IS_SLOW != 0 ? 40 : 200); ++seed) {
+    for (std::uint32_t seed = 1; seed <= cles::test::amount(200U, 40U); ++seed) {
         BOOST_TEST_CONTEXT("seed " << seed) {
             run all{seed};
             all.with_faults();

@@ -5,6 +5,7 @@
 #include "fmv/stream.hpp"
 #include "jadc2/scene.hpp"
 #include "jadc2/track_evaluation.hpp"
+#include "support/amount.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -15,8 +16,8 @@ namespace detection {
 namespace {
 
 constexpr std::uint64_t frames = 80;
-constexpr std::uint64_t many = CLES_DETECTION_IS_SLOW ? 2 : 20;
-constexpr std::uint64_t some = CLES_DETECTION_IS_SLOW ? 1 : 5;
+constexpr std::uint64_t many = cles::test::amount(20U, 2U);
+constexpr std::uint64_t some = cles::test::amount(5U, 1U);
 
 struct result {
     double found = 0, vehicles = 0, false_tracks = 0, frames = 0;
@@ -76,7 +77,7 @@ BOOST_AUTO_TEST_CASE(of_many_scenes_nine_of_ten_vehicles_are_found_and_few_that_
     BOOST_TEST(sum.found / sum.vehicles >= 0.9);
     BOOST_TEST(sum.false_tracks / sum.frames <= 0.1);
     // The error of a place is the same in all frames of a scene: there are as few samples as scenes.
-    BOOST_TEST(std::sqrt(sum.place_squares) < (CLES_DETECTION_IS_SLOW ? 3 : 1.5) * std::sqrt(sum.sigma_squares));
+    BOOST_TEST(std::sqrt(sum.place_squares) < cles::test::amount(1.5, 3.0) * std::sqrt(sum.sigma_squares));
     BOOST_TEST(std::sqrt(sum.velocity_squares) < 1.5 * std::sqrt(sum.sigma_v_squares));
 }
 

@@ -4,6 +4,7 @@
 #include "jadc2/rehearsal.hpp"
 #include "jadc2/vehicle_order.hpp"
 #include "strike/engagement.hpp"
+#include "support/amount.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -12,7 +13,7 @@
 namespace engagement {
 namespace {
 
-constexpr std::uint64_t strikes = CLES_DETECTION_IS_SLOW ? 12 : 100;
+constexpr std::uint64_t strikes = cles::test::amount(100U, 12U);
 
 using jadc2::test::order_for;
 
@@ -37,8 +38,8 @@ BOOST_AUTO_TEST_CASE(of_a_hundred_strikes_most_hit_with_fusion_and_many_miss_wit
         BOOST_TEST(record.observed_sigma < 1.5 * record.expected_sigma); // it knows how accurate it is
     }
     // Of a few, more may miss or hit by chance.
-    BOOST_TEST(static_cast<double>(fused.hits) >= (CLES_DETECTION_IS_SLOW ? 0.9 : 0.95) * static_cast<double>(strikes));
-    constexpr double most = CLES_DETECTION_IS_SLOW ? 0.95 : 0.7;
+    BOOST_TEST(static_cast<double>(fused.hits) >= cles::test::amount(0.95, 0.9) * static_cast<double>(strikes));
+    constexpr double most = cles::test::amount(0.7, 0.95);
     BOOST_TEST(static_cast<double>(alone.hits) <= most * static_cast<double>(strikes));
 }
 

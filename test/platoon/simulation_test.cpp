@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "platoon/simulation/simulation.hpp"
+#include "support/amount.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -11,13 +12,10 @@
 namespace simulation {
 namespace {
 
-// With a sanitizer each drive takes several times as long, and what counts is that all code has run: there, a part of
-// them.
-constexpr bool is_slow = CLES_SIMULATION_IS_SLOW;
-constexpr unsigned some_seeds = is_slow ? 1 : 5;
-constexpr unsigned many_seeds = is_slow ? 4 : 40;
-const std::vector<double> times = is_slow ? std::vector{5.5} : std::vector{2.0, 5.5, 7.0, 12.0};
-const std::vector<double> rates = is_slow ? std::vector{10.0} : std::vector{10.0, 50.0};
+constexpr unsigned some_seeds = cles::test::amount(5U, 1U);
+constexpr unsigned many_seeds = cles::test::amount(40U, 4U);
+const std::vector<double> times = cles::test::amount(std::vector{2.0, 5.5, 7.0, 12.0}, std::vector{5.5});
+const std::vector<double> rates = cles::test::amount(std::vector{10.0, 50.0}, std::vector{10.0});
 
 double worst_ratio(platoon::scenario what, unsigned seeds) {
     double worst = 0;

@@ -3,6 +3,7 @@
 
 #include "simulation/network/planted.hpp"
 #include "simulation/world/witness.hpp"
+#include "support/amount.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -18,12 +19,8 @@ namespace cles::simulation {
 
 inline constexpr bool has_security = CLES_SIMULATION_SECURED != 0;
 
-/// How much every test run simulates. With a sanitizer each step takes several times as long, and what counts is that
-/// all code has run: there, a fixed part is simulated, of fewer seeds and smaller networks, and all planted faults.
-template <class T>
-constexpr T amount(T whole, T with_sanitizer) {
-    return CLES_SIMULATION_IS_SLOW != 0 ? with_sanitizer : whole;
-}
+// How much every test run simulates: with a sanitizer a part, but all planted faults.
+using test::amount;
 inline constexpr std::uint64_t seeds = amount(3000, 60);
 inline constexpr std::uint64_t long_seeds = amount(100, 3);
 inline constexpr std::uint64_t secured_seeds = amount(100, 8);
@@ -33,14 +30,14 @@ inline constexpr std::uint64_t seeds_for_planted = amount(400, 150);
 inline constexpr unsigned steps_of_a_seed = 300;
 inline constexpr unsigned steps_of_a_long_seed = 3000;
 
-inline constexpr unsigned sharing_nodes = amount(200, 24);
-inline constexpr unsigned sharing_jobs = amount(100'000, 3'000);
+inline constexpr unsigned sharing_nodes = amount(200, 16);
+inline constexpr unsigned sharing_jobs = amount(100'000, 2'000);
 inline constexpr std::uint64_t sharing_seeds = amount(10, 1);
-inline constexpr unsigned jobs_of_a_small_mesh = amount(10'000, 3'000);
+inline constexpr unsigned jobs_of_a_small_mesh = amount(10'000, 2'000);
 
-inline constexpr unsigned mesh_nodes = amount(200, 30);
+inline constexpr unsigned mesh_nodes = amount(200, 20);
 inline constexpr std::uint64_t mesh_seeds = amount(10, 1);
-inline constexpr unsigned cut_mesh_nodes = amount(40, 20);
+inline constexpr unsigned cut_mesh_nodes = amount(40, 16);
 inline constexpr unsigned cut_mesh_cuts = amount(8, 4);
 inline constexpr std::uint64_t cut_mesh_seeds = amount(3, 1);
 inline constexpr std::uint64_t undeclared_mesh_seeds = amount(5, 1);
@@ -49,8 +46,8 @@ inline constexpr std::uint64_t secured_mesh_seeds = amount(4, 1);
 
 inline constexpr std::size_t gossip_nodes = amount(36, 20); ///< enough that no node asks all others
 inline constexpr std::size_t gossip_few_nodes = amount(30, 12);
-inline constexpr std::size_t gossip_many_nodes = amount(120, 24);
-inline constexpr std::chrono::seconds gossip_rough_time{amount(100, 30)};
+inline constexpr std::size_t gossip_many_nodes = amount(120, 20);
+inline constexpr std::chrono::seconds gossip_rough_time{amount(100, 20)};
 inline constexpr std::size_t announced_nodes = amount(300, 120);
 
 /// Reports each violation as a failure of the test.
