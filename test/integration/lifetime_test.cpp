@@ -91,6 +91,69 @@ BOOST_AUTO_TEST_CASE(a_service_that_is_closed_completes_running_requests_and_ann
     car.stop();
 }
 
+BOOST_AUTO_TEST_CASE(what_is_published_last_arrives_before_a_service_that_is_closed_leaves) {
+    asio::io_context io;
+    cles::service car{io, listening("car1", carrier::tcp4)};
+    car.on_bind("state");
+    const auto url = car.endpoints().front();
+    scripted_peer all{io, url};
+    scripted_peer newest{io, url};
+    BOOST_TEST(all.ask("BIND self:state id=1") == "id=1 {}");
+    BOOST_TEST(newest.ask("BIND self:state id=1 every=60000") == "id=1 {}");
+    car.update("state", "starting");
+    BOOST_TEST(newest.line().ends_with(R"({"value":"starting"})")); // the next one may wait for a minute
+    car.update("state", "moving");
+    auto elsewhere = car.make_publisher();
+    std::thread{[&] { elsewhere.update("state", "offline"); }}.join();
+    answer<void> closed;
+    car.async_close(patience, closed.take());
+    for (const auto* each : {"starting", "moving", "offline"}) {
+        BOOST_TEST(all.line().ends_with(R"({"value":")" + std::string{each} + R"("})"));
+    }
+    BOOST_TEST(all.rest() == "PUSH self:cles/leaving reply=no\n");
+    BOOST_TEST(newest.line().ends_with(R"({"value":"offline"})"));
+    BOOST_TEST(newest.rest() == "PUSH self:cles/leaving reply=no\n");
+    all.close();
+    newest.close();
+    run_until(io, [&] { return closed.done(); });
+    BOOST_TEST(!closed.code);
+}
+
+BOOST_AUTO_TEST_CASE(a_service_that_is_closed_waits_for_a_subscriber_that_reads_slowly) {
+    asio::io_context io;
+    cles::service car{io, listening("car1", carrier::tcp4)};
+    car.on_bind("picture");
+    scripted_peer peer{io, car.endpoints().front(), buffers::small};
+    BOOST_TEST(peer.ask("BIND self:picture id=1 keep=1000") == "id=1 {}");
+    const std::string large(100'000, 'x'); // more than sockets and the link keep
+    constexpr int many = 30;
+    for (int i = 0; i < many; ++i) {
+        car.update("picture", large);
+    }
+    answer<void> closed;
+    car.async_close(patience, closed.take());
+    run_ready(io);
+    BOOST_TEST(!closed.done());
+    for (int i = 0; i < many; ++i) {
+        BOOST_TEST(peer.line().size() > large.size());
+    }
+    BOOST_TEST(peer.rest() == "PUSH self:cles/leaving reply=no\n");
+    peer.close();
+    run_until(io, [&] { return closed.done(); });
+}
+
+BOOST_AUTO_TEST_CASE(what_another_thread_has_published_is_sent_when_the_service_is_stopped) {
+    asio::io_context io;
+    cles::service car{io, listening("car1", carrier::tcp4)};
+    car.on_bind("state");
+    scripted_peer peer{io, car.endpoints().front()};
+    BOOST_TEST(peer.ask("BIND self:state id=1") == "id=1 {}");
+    auto elsewhere = car.make_publisher();
+    std::thread{[&] { elsewhere.update("state", "offline"); }}.join();
+    car.stop();
+    BOOST_TEST(peer.line().ends_with(R"({"value":"offline"})"));
+}
+
 BOOST_AUTO_TEST_CASE(a_service_that_is_closed_waits_for_its_handlers_no_longer_than_it_may) {
     asio::io_context io;
     asio::io_context other;

@@ -311,8 +311,9 @@ class service : public registrar {
     /// Requests on existing links, or to its URL, are still served, so work can be completed before `stop`, which calls
     /// this too. Idempotent.
     void leave();
-    /// Shuts down gracefully: calls `leave`, accepts no more links, replies to requests that have started (for at most
-    /// `limit`; the others then fail with `unavailable`), and to new ones with `busy`. Then tells the peers that any
+    /// Shuts down gracefully: calls `leave`, accepts no more links, sends the updates that have been published and
+    /// replies to requests that have started (for at most `limit`; subscribers that are slower miss updates, the other
+    /// requests fail with `unavailable`), and to new requests with `busy`. Then tells the peers that any
     /// request without a reply has not been started, and completes when the links have ended, at most a second later
     /// (`limits::discard`): `void(error_code)`. Call `stop` afterwards; if it is called earlier, the code is `stopped`.
     /// Cancellation ends the wait, but new requests are still not started.

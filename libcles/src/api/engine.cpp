@@ -234,24 +234,7 @@ class posted_updates final : public update_sink, public std::enable_shared_from_
             transport::post_call<&posted_updates::drain>(executor_, shared_from_this());
         }
     }
-    /// After this, nothing is posted. Call it on the executor.
-    void close() {
-        const std::scoped_lock lock{mutex_};
-        closed_ = true;
-        waiting_.clear();
-    }
-
-  private:
-    static constexpr std::size_t max_waiting = 1024;
-    static constexpr std::size_t max_bytes = 4U << 20U;
-
-    struct entry {
-        [[nodiscard]] std::size_t size() const noexcept { return noun.size() + json.size(); }
-
-        std::string noun;
-        std::string json;
-    };
-
+    /// Publishes what waits. Call it on the executor.
     void drain() {
         std::deque<entry> fetched;
         std::size_t lost = 0;
@@ -276,6 +259,23 @@ class posted_updates final : public update_sink, public std::enable_shared_from_
             take(update);
         }
     }
+    /// After this, nothing is posted. Call it on the executor.
+    void close() {
+        const std::scoped_lock lock{mutex_};
+        closed_ = true;
+        waiting_.clear();
+    }
+
+  private:
+    static constexpr std::size_t max_waiting = 1024;
+    static constexpr std::size_t max_bytes = 4U << 20U;
+
+    struct entry {
+        [[nodiscard]] std::size_t size() const noexcept { return noun.size() + json.size(); }
+
+        std::string noun;
+        std::string json;
+    };
 
     void take(const entry& update) const {
         const auto by = service_.lock();
@@ -355,8 +355,16 @@ std::shared_ptr<update_sink> engine::cross_thread_updates() {
     return posted_updates_;
 }
 
+std::uint64_t engine::close(std::chrono::milliseconds limit, pending_ptr operation) {
+    if (posted_updates_) {
+        posted_updates_->drain();
+    }
+    return local_node::close(limit, std::move(operation));
+}
+
 void engine::stop() {
     if (posted_updates_) {
+        posted_updates_->drain();
         posted_updates_->close();
     }
     local_node::stop();

@@ -9,6 +9,8 @@
 
 #include <boost/asio/any_io_executor.hpp>
 
+#include <chrono>
+#include <cstdint>
 #include <memory>
 #include <string_view>
 
@@ -26,6 +28,7 @@ class engine final : public core::local_node {
     bool remove(cles::verb verb, std::string_view offered);
     /// Receives updates from other threads.
     std::shared_ptr<update_sink> cross_thread_updates();
+    std::uint64_t close(std::chrono::milliseconds limit, pending_ptr operation);
     void stop() override;
 
   private:

@@ -430,6 +430,9 @@ std::uint64_t local_node::close(std::chrono::milliseconds limit, detail::pending
     graceful_shutdown_.emplace(*this, ticket, limit, std::move(operation));
     listeners_.reject();
     connections_.refuse_new_requests();
+    for (const auto& c : connections_.all()) {
+        c->session().serving().drain_last(now());
+    }
     check_shutdown();
     return ticket;
 }

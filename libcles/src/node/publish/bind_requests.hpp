@@ -38,6 +38,10 @@ class bind_requests {
     void clear();
     /// Sends pending updates: the link is writable again.
     void drain(time_point now);
+    /// The same, also those that `every` would let wait: no others may follow.
+    void drain_last(time_point now) { bound_.drain_last(now); }
+    /// Whether updates of this node wait to be sent.
+    [[nodiscard]] bool is_behind() const noexcept { return bound_.is_behind(); }
     [[nodiscard]] std::size_t size() const noexcept {
         return bound_.size() + (remote_bindings_ ? remote_bindings_->size() : 0);
     }

@@ -23,6 +23,11 @@ void binding::drain(time_point now) {
     }
 }
 
+void binding::drain_last(time_point now) {
+    next_due_ = {};
+    drain(now);
+}
+
 void binding::drain_newest(time_point now) {
     if (now < next_due_) {
         if (!armed()) {
@@ -107,6 +112,21 @@ void link_bindings::clear() {
     for (auto* t : std::exchange(topics_, {})) {
         release(*t);
     }
+}
+
+void link_bindings::drain_last(time_point now) {
+    for (auto* t : topics_) {
+        if (auto* b = t->find(target_)) {
+            b->drain_last(now);
+        }
+    }
+}
+
+bool link_bindings::is_behind() const noexcept {
+    return std::ranges::any_of(topics_, [this](topic* t) {
+        const auto* const b = t->find(target_);
+        return b != nullptr && b->is_behind();
+    });
 }
 
 void link_bindings::drain(time_point now) {

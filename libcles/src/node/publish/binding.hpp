@@ -46,6 +46,8 @@ class binding final : public deadline {
 
     /// Sends the subscriber its pending updates, as far as it takes them.
     void drain(time_point now);
+    /// The same, without waiting for `every`.
+    [[gnu::cold]] void drain_last(time_point now);
     /// Does nothing if they are the same: the binding is renewed.
     void set_terms(terms wanted) noexcept;
     [[nodiscard]] subscriber& target() const noexcept { return target_; }
@@ -98,6 +100,10 @@ class link_bindings {
     void clear();
     /// Sends pending updates: the link is writable again.
     void drain(time_point now);
+    /// The same, also those that `every` would let wait: no others may follow.
+    [[gnu::cold]] void drain_last(time_point now);
+    /// Whether updates wait to be sent.
+    [[nodiscard, gnu::cold]] bool is_behind() const noexcept;
 
     [[nodiscard]] std::size_t size() const noexcept { return topics_.size(); }
 

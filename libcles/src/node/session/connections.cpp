@@ -216,7 +216,10 @@ void graceful_shutdown::check() {
         return;
     }
     const scoped_flag during{looking_};
-    const auto serves = [](const auto& c) { return c->session().serving().in_flight() != 0; };
+    const auto serves = [](const auto& c) {
+        const auto& serving = c->session().serving();
+        return serving.in_flight() != 0 || serving.is_behind();
+    };
     if (ending_ || std::ranges::none_of(host_.connections().all(), serves)) {
         end_links();
     }

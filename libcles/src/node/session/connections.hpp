@@ -86,8 +86,9 @@ class connections {
     std::size_t sources_ = 0;
 };
 
-/// Shuts a service down in order, so that no request is lost (docs/protocol.md, "Leaving"): it starts nothing new,
-/// answers what it has started, announces on each link that it leaves, and waits until the links have ended.
+/// Shuts a service down in order, so that no request and no update is lost (docs/protocol.md, "Leaving"): it starts
+/// nothing new, answers what it has started, sends what it has published, announces on each link that it leaves, and
+/// waits until the links have ended.
 class graceful_shutdown final : private deadline {
   public:
     /// Requests that have not been answered after `limit` are aborted. `done` completes when the links have ended, or

@@ -54,6 +54,10 @@ class inbound final : private task_sink {
     void serve_more(time_point now);
     /// Sends pending updates: the link is writable again.
     void drain(time_point now) { bound_.drain(now); }
+    /// Sends pending updates, also those that `every` would let wait: no others may follow.
+    void drain_last(time_point now) { bound_.drain_last(now); }
+    /// Whether updates of this node wait to be sent.
+    [[nodiscard]] bool is_behind() const noexcept { return bound_.is_behind(); }
     [[nodiscard]] std::size_t in_flight() const noexcept { return calls_.size() + ordered_.size(); }
     /// Whether no state is kept for the peer: no running or waiting request, no binding, no remembered reply.
     [[nodiscard]] bool is_idle() const noexcept {
