@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Nodes that discover each other in a multicast group on loopback, and requests by name without a configured URL.
 
+#include <cles/routing.hpp>
 #include <cles/service.hpp>
 
 #include "support/feed_log.hpp"
@@ -376,6 +377,31 @@ BOOST_FIXTURE_TEST_CASE(a_second_live_node_of_a_name_is_reported_and_not_asked, 
     BOOST_TEST(std::count(warnings.begin(), warnings.end(), "another node also has the name 'car1', on 127.0.0.1") ==
                1);
     BOOST_TEST(pulled(asker, "self:cles/peers").text.find(R"("state":"clash")") != std::string::npos);
+}
+
+BOOST_FIXTURE_TEST_CASE(the_first_of_two_live_nodes_of_a_name_keeps_its_requests, fixture) {
+    const auto car1 = serving("car1");
+    auto options = in_group("asker");
+    options.routing = cles::routing();
+    cles::service asker{here, std::move(options)};
+    until([&] { return knows(asker, "car1"); });
+    asio::io_context third;
+    auto of_second = in_group("car1");
+    of_second.listen = {"tcp://127.0.0.1:0"};
+    cles::service second{third, std::move(of_second)};
+    second.on_pull("who", [] { return std::string{"the second"}; });
+    until([&] {
+        third.restart();
+        third.poll();
+        return asker.peers().size() == 2;
+    });
+    BOOST_TEST((asker.peers()[1].state == peer_state::clash));
+    const auto answer = pulled(asker, "car1:who");
+    BOOST_TEST(answer.text == R"({"value":"car1"})");
+    BOOST_TEST(answer.why ==
+               "a second node has the name 'car1', at " + second.endpoints().front() + ", and gets no requests");
+    BOOST_TEST(pulled(asker, "any:who").text == R"({"value":"car1"})");
+    BOOST_TEST(pulled(asker, "all:who").text == R"({"results":{"car1":{"value":"car1"}},"errors":{}})");
 }
 
 BOOST_FIXTURE_TEST_CASE(what_is_malformed_is_counted_and_otherwise_without_effect, fixture) {

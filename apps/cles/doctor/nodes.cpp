@@ -10,10 +10,12 @@
 
 #include <boost/describe.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -131,25 +133,41 @@ asio::awaitable<void> check_plugins(client& requester, const std::vector<listed_
     }
 }
 
+// Either of the two lists only the other one, so it does not show which was first.
+void note_conflicts(const std::vector<listed_node>& listed, std::map<std::string, std::string>& conflicts) {
+    for (const auto& node : listed) {
+        if (node.state != "clash") {
+            continue;
+        }
+        auto& places = conflicts[node.node];
+        const auto first = std::ranges::find_if(listed, [&](const listed_node& other) {
+            return other.node == node.node && other.state != "clash" && !other.endpoints.empty();
+        });
+        if (first != listed.end() && places.empty()) {
+            places = "the one at " + first->url() + " gets its requests, the second one" +
+                     (node.endpoints.empty() ? "" : ", at " + node.url() + ",") + " none";
+        }
+    }
+}
+
 // The nodes know of a name conflict sooner than this command, which has just started.
 asio::awaitable<void> check_names(client& requester, const std::vector<listed_node>& nodes, findings& found) {
     auto urls = urls_of(nodes);
     const auto answers = co_await ask_all(requester, "self:cles/peers", std::move(urls), query_timeout);
-    auto all = nodes;
+    std::map<std::string, std::string> conflicts; // by name: where the two are, if that is known
+    note_conflicts(nodes, conflicts);
     for (const auto& answer : answers) {
         try {
-            const auto peers = answer.error.empty() ? peers_in(answer.json) : std::vector<listed_node>{};
-            all.insert(all.end(), peers.begin(), peers.end());
+            note_conflicts(answer.error.empty() ? peers_in(answer.json) : std::vector<listed_node>{}, conflicts);
         } catch (const cles::error&) {
             continue; // check_protocol reports it
         }
     }
-    std::set<std::string> names;
-    for (const auto& node : all) {
-        if (node.state == "clash" && names.insert(node.node).second) {
-            found.failure("nodes", "two nodes have the name " + node.node + "; one of them gets no requests",
-                          "give each a unique name: --name of cles serve, node in clesd.yaml");
-        }
+    for (const auto& [name, places] : conflicts) {
+        found.failure("nodes",
+                      "two nodes have the name " + name +
+                          (places.empty() ? "; the second one gets no requests" : ": " + places),
+                      "give each a unique name: --name of cles serve, node in clesd.yaml");
     }
 }
 

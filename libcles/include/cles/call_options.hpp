@@ -31,8 +31,9 @@ class call_options {
     /// Makes the request part of a trace: "00-<32 hex digits>-<16 hex digits>-<2 hex digits>" (W3C `traceparent`), such
     /// as `request::trace()` of the request that causes this one. Text of another form is refused. Not for bindings.
     call_options& trace(std::string_view parent);
-    /// Receives the peer's error message if the request fails. It is written before the request completes, and must
-    /// outlive the request.
+    /// Receives the peer's error message if the request fails. If it succeeds although a second node has the name of
+    /// its target, which gets no requests, it receives a message that says where that node is. It is written before the
+    /// request completes, and must outlive the request; if there is nothing to tell, it stays as it is.
     call_options& diagnostics(std::string& text);
     /// Called for each progress report of a DELEGATE, with a fraction from 0 to 1 and a JSON object. Runs inline on the
     /// service's executor. Makes the request ask the peer for reports.

@@ -155,7 +155,7 @@ class service_call final : public call_control, public std::enable_shared_from_t
             if (self) {
                 self->asked_->tickets.erase(key);
             }
-            answer(weak, answered, code, reply.text, *why);
+            answer(weak, answered, code, reply.text, code ? std::string_view{*why} : std::string_view{});
         };
         auto chosen = options;
         chosen.diagnostics(*why);

@@ -6,6 +6,7 @@
 #include "node/publish/feed_machine.hpp"
 #include "node/publish/feed_mailbox.hpp"
 #include "node/publish/group_feeds.hpp"
+#include "node/routing/peer_channels.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
 
@@ -228,6 +229,9 @@ std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std
             return refused(objection.code, std::move(objection.message));
         }
         return std::make_shared<group_feed_handle>(host, target, path);
+    }
+    if (options.at_.empty()) {
+        host->peer_channels().tell_of_second(target, options.diagnostics_);
     }
     auto made = std::make_shared<link_feed>(host, target, path, options.every_.count() > 0);
     host->feeds().enter(made->machine(), made,

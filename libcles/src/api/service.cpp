@@ -322,6 +322,9 @@ std::string service::request(std::string_view command, const call_options& optio
             throw error(errc::stopped, "the context was stopped before the answer was received");
         }
     }
+    if (options.diagnostics_ != nullptr && !result->why.empty()) {
+        *options.diagnostics_ = result->why;
+    }
     if (result->code) {
         throw error(result->code, result->why);
     }

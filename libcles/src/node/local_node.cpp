@@ -298,6 +298,9 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     if (r == nullptr) {
         return fail_later(std::move(operation), code, std::move(why));
     }
+    if (options.at_.empty()) {
+        peer_channels_.tell_of_second(noun.target, options.diagnostics_);
+    }
     const auto id = draw_id();
     const auto started = now();
     const auto deadline = saturating_add(started, time_limit(options.deadline_, how));

@@ -411,9 +411,6 @@ void discovery::on_peer(std::string_view node, membership::change what, std::str
                            ? "another node also has the name '" + name + "', on " + std::string{where}
                            : "a second node has the name '" + name + "', on " + std::string{where} +
                                  ", and gets no requests");
-        if (name != host_.node().name) {
-            host_.peer_channels().on_address_changed(name);
-        }
         return;
     case membership::change::taken:
         host_.post_log(log_level::error, "the name '" + name + "' is already in use: the node at " +

@@ -357,11 +357,11 @@ void membership::on_probed(std::uint64_t ticket, const probe_outcome& found, tim
             end(at, change::gone, now);
         }
         break;
-    case action::owner_stays: confirm_conflict(*conflict); break;
+    case action::owner_stays: report_conflict(*conflict); break;
     case action::contender_first:
         if (own) {
             const std::string where{conflict->contender.where()};
-            confirm_conflict(*conflict);
+            report_conflict(*conflict);
             notify(own_name_, change::taken, where);
         } else {
             swap_with_contender(at);
@@ -380,13 +380,8 @@ void membership::swap_with_contender(entries::iterator at) {
     notify(name, change::moved, e.owner.where());
     const auto still = peers_.find(name);
     if (still != peers_.end() && still->second.second) {
-        confirm_conflict(*still->second.second);
+        report_conflict(*still->second.second);
     }
-}
-
-void membership::confirm_conflict(name_conflict& conflict) {
-    conflict.check.confirmed = true;
-    report_conflict(conflict);
 }
 
 void membership::report_conflict(name_conflict& conflict) {
@@ -397,12 +392,14 @@ void membership::report_conflict(name_conflict& conflict) {
     }
 }
 
-std::optional<std::string_view> membership::conflicting_endpoint_of(std::string_view node) const noexcept {
+std::string membership::second_of(std::string_view node) const {
     const auto found = peers_.find(node);
-    if (found == peers_.end() || !found->second.second || !found->second.second->check.confirmed) {
+    const auto* const second = found == peers_.end() ? nullptr : found->second.second.get();
+    if (second == nullptr || !second->is_reported) {
         return {};
     }
-    return found->second.second->contender.where();
+    const auto& r = second->contender;
+    return r.where().empty() ? host_text(r.from) : std::string{r.where()};
 }
 
 // -- leaving and removal -------------------------------------------------------------------------------------------

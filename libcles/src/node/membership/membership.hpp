@@ -29,7 +29,7 @@ namespace cles::core {
 /// A name belongs to the incarnation that was first received under it (the owner), for as long as it is live: only the
 /// owner, from its own sources, moves the name or leaves. Another incarnation that announces the same name (the
 /// contender) waits. If the owner becomes silent, it was a restart, and the name passes to the contender. If both are
-/// received alternately, it is a name conflict: it is reported, and the contender gets no requests.
+/// received alternately, it is a name conflict: it is reported, and the contender gets no requests, but the owner does.
 ///
 /// With a prober this is decided sooner, by asking the owner. If it does not answer, the name passes at once; if both
 /// incarnations answer, it is a name conflict.
@@ -120,8 +120,9 @@ class membership final : private deadline {
     }
     /// The outcome of a probe.
     void on_probed(std::uint64_t ticket, const probe_outcome& found, time_point now);
-    /// The URL of the second live node of that name; nothing unless both have answered a probe.
-    [[nodiscard]] std::optional<std::string_view> conflicting_endpoint_of(std::string_view node) const noexcept;
+    /// Where a second live node of that name is, which gets no requests: its URL, or its host if none is usable from
+    /// here. Empty if there is none.
+    [[nodiscard]] std::string second_of(std::string_view node) const;
     /// This node was suspended and could not receive anything: failure detection starts over.
     void note_suspension(time_point now) noexcept { resumed_at_ = now; }
 
@@ -216,7 +217,6 @@ class membership final : private deadline {
         return r.is_hinted_alive(announced_at, interval_of(r.announced, r.from));
     }
     void swap_with_contender(entries::iterator at);
-    void confirm_conflict(name_conflict& conflict);
     void report_conflict(name_conflict& conflict);
     void on_owner_seen(named_entry& one, bool moved, bool by_gossip, time_point now);
     void end(entries::iterator at, change how, time_point now);

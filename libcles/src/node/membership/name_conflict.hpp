@@ -43,7 +43,6 @@ struct name_check {
     std::uint64_t ticket = 0;
     time_point asked{};
     time_point owner_began{};
-    bool confirmed = false; ///< both have answered
 };
 
 /// Another incarnation (the contender) under a name that is taken.

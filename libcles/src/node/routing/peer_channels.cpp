@@ -383,11 +383,6 @@ std::optional<peer_channels::place> peer_channels::discovered_place_of(std::stri
     if (!known || host_.discovery().expects_more_of(target)) {
         return {};
     }
-    if (const auto second = peers.conflicting_endpoint_of(target)) {
-        throw error(errc::no_target, "two nodes have the name '" + std::string{target} + "', at " +
-                                         std::string{*known} + " and at " + std::string{*second} +
-                                         ": give the URL of one");
-    }
     auto* const routes = host_.node().gossip_responder;
     auto hop = routes != nullptr ? routes->reach().next_hop_to(target, by.via, by.requester) : std::string{target};
     const auto where = hop == target ? known : peers.address_of(hop);
@@ -399,6 +394,16 @@ std::optional<peer_channels::place> peer_channels::discovered_place_of(std::stri
         throw error(errc::no_target, host_.node().name + reason);
     }
     return place{std::string{*where}, std::move(hop)};
+}
+
+void peer_channels::tell_of_second(std::string_view target, std::string* diagnostics) const {
+    if (diagnostics == nullptr || directory_.contains(target)) {
+        return;
+    }
+    if (const auto where = host_.node().peers.second_of(target); !where.empty()) {
+        *diagnostics =
+            "a second node has the name '" + std::string{target} + "', at " + where + ", and gets no requests";
+    }
 }
 
 void peer_channels::on_dialled(peer_channel& channel, boost::system::error_code code) {

@@ -159,6 +159,10 @@ class peer_channels {
     /// Resolves or fails the names that wait for discovery.
     void on_discovery_grace_over();
 
+    /// Tells who sends a request to that name, which only the first node of a name conflict gets, that there is a
+    /// second one. `diagnostics`: where the requester wants to read it; null: nowhere.
+    void tell_of_second(std::string_view target, std::string* diagnostics) const;
+
     /// Cancels a request that waits for its link. Returns false if there is none with that id.
     bool cancel(std::uint64_t id);
     /// The feed no longer waits for a link.
