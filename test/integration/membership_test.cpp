@@ -6,6 +6,7 @@
 
 #include "support/feed_log.hpp"
 #include "support/group_address.hpp"
+#include "support/group_repeater.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
 
@@ -87,11 +88,12 @@ struct fixture {
     }
     bool knows(const cles::service& s, std::string_view name) { return find(s.peers(), name) != nullptr; }
 
-    std::uint64_t announcements_sent(cles::service& of) {
-        const auto all = pulled(of, "self:cles/metrics").text;
-        const std::string_view key = "\"announcements_sent\":";
+    std::uint64_t count_of(cles::service& node, const std::string& counter) {
+        const auto all = pulled(node, "self:cles/metrics").text;
+        const auto key = "\"" + counter + "\":";
         return std::stoull(all.substr(all.find(key) + key.size()));
     }
+    std::uint64_t announcements_sent(cles::service& of) { return count_of(of, "announcements_sent"); }
 
     struct outcome {
         bool ended = false;
@@ -402,6 +404,18 @@ BOOST_FIXTURE_TEST_CASE(the_first_of_two_live_nodes_of_a_name_keeps_its_requests
                "a second node has the name 'car1', at " + second.endpoints().front() + ", and gets no requests");
     BOOST_TEST(pulled(asker, "any:who").text == R"({"value":"car1"})");
     BOOST_TEST(pulled(asker, "all:who").text == R"({"results":{"car1":{"value":"car1"}},"errors":{}})");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_program_that_repeats_the_group_makes_no_conflict, fixture) {
+    const group_repeater repeater{here, where};
+    const auto car1 = serving("car1");
+    cles::service asker{here, in_group("asker")};
+    until([&] { return knows(asker, "car1"); });
+    until([&] { return count_of(asker, "group_copied") > 2; });
+    BOOST_TEST(pulled(asker, "car1:who").text == R"({"value":"car1"})");
+    BOOST_TEST(asker.peers().size() == 1U);
+    BOOST_TEST(car1->peers().empty());
+    BOOST_TEST(warnings.empty());
 }
 
 BOOST_FIXTURE_TEST_CASE(what_is_malformed_is_counted_and_otherwise_without_effect, fixture) {

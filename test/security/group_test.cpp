@@ -117,6 +117,31 @@ BOOST_AUTO_TEST_CASE(a_line_is_opened_by_who_has_a_session_with_the_sender) {
     BOOST_TEST(car2.receiver.accept(result.accepted_by, ordered_by::counter));
 }
 
+BOOST_AUTO_TEST_CASE(an_announcement_counts_once_by_its_epoch_and_seq) {
+    using repetition = cles::core::datagram_admission::repetition;
+    const auto old = car1.seal("an announcement");
+    car2.meet(car1);
+    const auto take = [&](const bytes& datagram, std::uint64_t seq) {
+        return car2.receiver.accept_announcement(open(car2, datagram).accepted_by, seq);
+    };
+    BOOST_TEST((take(old, 9) == repetition::refused)); // before the session
+    const auto first = car1.seal("an announcement");
+    BOOST_TEST((take(first, 7) == repetition::first));
+    BOOST_TEST((take(first, 7) == repetition::again));
+    BOOST_TEST((take(first, 6) == repetition::again));
+    // Any member can seal it anew, with a counter that has not been received.
+    BOOST_TEST((take(car1.seal("an announcement"), 7) == repetition::again));
+    BOOST_TEST((take(car1.seal("an announcement"), 8) == repetition::first));
+    // A salt of the same epoch changes nothing, one of another does.
+    for (const auto epoch : {car1.epoch, car1.epoch + 1}) {
+        member_end other{fleet, 1, 104 + epoch};
+        other.epoch = epoch;
+        car2.meet(other);
+        const auto sealed = other.seal("an announcement");
+        BOOST_TEST((take(sealed, 8) == (epoch == car1.epoch ? repetition::again : repetition::first)));
+    }
+}
+
 BOOST_AUTO_TEST_CASE(the_longest_line_fits_and_a_longer_one_is_refused) {
     car2.meet(car1);
     const std::string longest(1200, 'x');

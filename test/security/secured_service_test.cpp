@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/routing.hpp>
+
 #include "security/secured_services.hpp"
 #include "support/feed_log.hpp"
 #include "support/group_address.hpp"
+#include "support/group_repeater.hpp"
 
 #include <boost/test/unit_test.hpp>
 
+#include <cstdint>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -31,6 +35,12 @@ struct fixture {
         const auto described = ask(io, node, "PULL self:cles");
         const auto at = described.find("\"roster\":");
         return at == std::string::npos ? 0 : std::stoull(described.substr(at + 9));
+    }
+
+    std::uint64_t count_of(cles::service& node, const std::string& counter) {
+        const auto all = ask(io, node, "PULL self:cles/metrics");
+        const auto at = all.find("\"" + counter + "\":");
+        return at == std::string::npos ? 0 : std::stoull(all.substr(at + counter.size() + 3));
     }
 
     boost::asio::io_context io;
@@ -255,6 +265,34 @@ BOOST_AUTO_TEST_CASE(others_are_not_heard_and_hear_nothing) {
         const auto seen = ask(io, *outsider, "PULL self:cles/peers");
         BOOST_TEST(!contains(seen, "sat"), seen);
     }
+}
+
+BOOST_AUTO_TEST_CASE(what_a_stranger_repeats_takes_no_name_away) {
+    const auto where = cles::test::fresh_group();
+    fleet.add("sat1");
+    fleet.add("sat2");
+    auto first = fleet.options("sat1");
+    first.multicast = where;
+    auto second = fleet.options("sat2");
+    second.multicast = where;
+    second.routing = cles::routing();
+    cles::test::group_repeater stranger{io, where};
+    cles::service sat1{io, std::move(first)};
+    cles::service sat2{io, std::move(second)};
+    sat1.on_pull("power", [] { return 3; });
+    cles::test::run_until(io, [&] { return ask(io, sat2, "PULL sat1:power") == "{\"value\":3}"; });
+    for (int round = 0; round < 3; ++round) {
+        const auto heard = stranger.heard();
+        const auto copies = count_of(sat2, "group_copied");
+        cles::test::run_until(io, [&] { return stranger.heard() > heard + 2; });
+        stranger.repeat_all();
+        cles::test::run_until(io, [&] { return count_of(sat2, "group_copied") > copies + 1; });
+        BOOST_TEST(ask(io, sat2, "PULL sat1:power") == "{\"value\":3}");
+        BOOST_TEST(ask(io, sat2, "PULL any:power") == "{\"value\":3}");
+        BOOST_TEST(ask(io, sat2, "PULL all:power") == "{\"results\":{\"sat1\":{\"value\":3}},\"errors\":{}}");
+    }
+    BOOST_TEST(sat2.peers().size() == 1U);
+    BOOST_TEST(sat1.peers().size() == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(a_node_that_restarts_is_heard_again) {

@@ -64,6 +64,14 @@ class datagram_admission {
     /// \param is_signed it has a valid signature, so its `seq` shows whether it is a repeat
     [[nodiscard]] virtual bool accept(bool is_signed) = 0;
 
+    enum class repetition : std::uint8_t {
+        first, ///< no announcement of that incarnation with this `seq` or a greater one has counted
+        again, ///< it may be the last one, received by another of several interfaces
+        refused,
+    };
+    /// The same for an announcement with a valid signature, of the incarnation that the sender has confirmed.
+    [[nodiscard]] virtual repetition accept_announcement(std::uint64_t seq) = 0;
+
   protected:
     ~datagram_admission() = default;
 };
@@ -81,6 +89,9 @@ struct group_datagram {
     /// Whether it counts; see `datagram_admission`.
     [[nodiscard]] bool accept(bool is_signed = false) const {
         return admission == nullptr || admission->accept(is_signed);
+    }
+    [[nodiscard]] datagram_admission::repetition accept_announcement(std::uint64_t seq) const {
+        return admission == nullptr ? datagram_admission::repetition::first : admission->accept_announcement(seq);
     }
 };
 

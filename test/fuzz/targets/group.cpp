@@ -92,10 +92,9 @@ class output final : public core::group_port {
 class listener final : public core::announcement_listener {
   public:
     void on_solicitation(bool, time_point) override {}
-    void on_announcement(const core::group_source& from, const protocol::request_line& update, time_point) override {
-        require(from.port != 0, "a node does not hear itself");
-        require(is_valid_json(update.body, 8), "an announcement is JSON", update.text);
-        require(!protocol::is_reserved_target(update.noun.target), "it is of a node", update.text);
+    void on_announcement(core::heard_announcement heard, time_point) override {
+        require(heard.from.port != 0, "a node does not hear itself");
+        require(!protocol::is_reserved_target(heard.said.node), "it is of a node", heard.said.node);
     }
 };
 

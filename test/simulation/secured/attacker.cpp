@@ -104,7 +104,12 @@ void attacker::attack(deed what, unsigned host, unsigned count, const security::
         }
         case deed::headed: send_headed(host, as); break;
         case deed::repeated: net_.inject(old.from, old.to, old.bytes); break;
-        case deed::redirected: net_.inject({old.from.host, old.from.port + chance_.below(2)}, to, old.bytes); break;
+        case deed::redirected: {
+            const auto to_group = !old.to && chance_.chance(500);
+            net_.inject({old.from.host, old.from.port + chance_.below(2)}, to_group ? std::nullopt : std::optional{to},
+                        old.bytes);
+            break;
+        }
         case deed::unsealed: {
             const auto from = old.to && old.to->host == host ? old.from : endpoint{(host + 1) % 2, 1000};
             net_.inject(from, chance_.chance(500) ? std::optional{to} : std::nullopt,

@@ -91,6 +91,7 @@ class reporting_port final : public core::group_port, private core::group_listen
             }
             return counts;
         }
+        repetition accept_announcement(std::uint64_t seq) override { return datagram_.accept_announcement(seq); }
 
       private:
         const core::group_datagram& datagram_;

@@ -8,6 +8,7 @@
 #include <map>
 #include <set>
 #include <utility>
+#include <vector>
 
 namespace cles::simulation {
 namespace {
@@ -55,7 +56,7 @@ class neighbouring final : public part {
 
     void on_crash(node_run& n) override { accounts_.erase(&n); }
 
-    void on_group_heard(node_run& at, const core::group_source&, std::string_view datagram) override {
+    void on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) override {
         protocol::request_line update;
         core::announcement said;
         std::string why;
@@ -63,10 +64,10 @@ class neighbouring final : public part {
             return;
         }
         if (update.noun.path == core::load_path) {
-            on_load_heard(at, update);
+            on_load_heard(at, from, update);
             return;
         }
-        if (!read_announcement(update, said, why)) {
+        if (!read_announcement(update, said, why) || (world_.secured() && !contains(said.sources, from))) {
             return;
         }
         auto& r = accounts_[&at].runs[*update.epoch];
@@ -83,6 +84,7 @@ class neighbouring final : public part {
         r.seq = *update.seq;
         r.at = at.now();
         r.interval = said.interval;
+        r.sources = said.sources;
     }
 
     void on_neighbour(node_run& at, std::string_view node, membership::change what) override {
@@ -204,6 +206,7 @@ class neighbouring final : public part {
         time_point reported{}; ///< its load, perhaps by somebody who has repeated it
         milliseconds interval{0};
         bool left = false; ///< announced that it leaves, and was listed then
+        std::vector<core::group_source> sources;
     };
     /// What a node has received and reported.
     struct account {
@@ -234,12 +237,16 @@ class neighbouring final : public part {
         world_.end_run(n);
     }
 
+    static bool contains(const std::vector<core::group_source>& sources, const core::group_source& from) {
+        return std::ranges::find(sources, from) != sources.end();
+    }
+
     // A sign of life, unless it is a copy.
-    void on_load_heard(node_run& at, const protocol::request_line& report) {
+    void on_load_heard(node_run& at, const core::group_source& from, const protocol::request_line& report) {
         auto& runs = accounts_[&at].runs;
         const auto found = runs.find(*report.epoch);
         if (found != runs.end() && found->second.node == report.noun.target && *report.seq >= found->second.seq &&
-            !found->second.left) {
+            !found->second.left && contains(found->second.sources, from)) {
             found->second.reported = at.now();
         }
     }

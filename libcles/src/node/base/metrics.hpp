@@ -104,6 +104,7 @@ struct counters {
     std::uint64_t group_received = 0;     ///< datagrams of the multicast group, other than its own
     std::uint64_t group_dropped = 0;      ///< of these: neither BIND nor update, or malformed, or beyond a limit
     std::uint64_t group_repeated = 0;     ///< copies, from nodes that send on several interfaces
+    std::uint64_t group_copied = 0;       ///< from a source that is not their sender's: others have repeated them
     std::uint64_t group_sent = 0;
     std::uint64_t group_unsent = 0; ///< too large, or too much was pending
     std::uint64_t links_accepted = 0;
@@ -117,14 +118,16 @@ struct counters {
     std::uint64_t handlers_running = 0;
     std::uint64_t routed = 0; ///< of these, requests that wait for other nodes
 };
-BOOST_DESCRIBE_STRUCT(
-    counters, (),
-    (errors, errors_unsent, housekeeping, housekeeping_errors, handlers_running, routed, requests_repeated,
-     requests_sent, requests_resent, replies_dropped, updates_published, nouns_retired, updates_delivered, updates_shed,
-     updates_too_large, updates_received, updates_dropped, updates_unsigned, announcements_sent, announcements_received,
-     announcements_dropped, announcements_foreign, peers_known, peers_refused, tables_asked, tables_failed, tables_told,
-     entries_dropped, grants_sent, grants_received, granted_jobs_refused, jobs_moved_in, jobs_moved_out, leases_expired,
-     datagrams_withheld, datagrams_unsealed, group_received, group_dropped, group_repeated, group_sent, group_unsent,
-     group_leases, links_open, links_accepted, links_refused, links_evicted, links_lost, bytes_received, bytes_sent))
+BOOST_DESCRIBE_STRUCT(counters, (),
+                      (errors, errors_unsent, housekeeping, housekeeping_errors, handlers_running, routed,
+                       requests_repeated, requests_sent, requests_resent, replies_dropped, updates_published,
+                       nouns_retired, updates_delivered, updates_shed, updates_too_large, updates_received,
+                       updates_dropped, updates_unsigned, announcements_sent, announcements_received,
+                       announcements_dropped, announcements_foreign, peers_known, peers_refused, tables_asked,
+                       tables_failed, tables_told, entries_dropped, grants_sent, grants_received, granted_jobs_refused,
+                       jobs_moved_in, jobs_moved_out, leases_expired, datagrams_withheld, datagrams_unsealed,
+                       group_received, group_dropped, group_repeated, group_copied, group_sent, group_unsent,
+                       group_leases, links_open, links_accepted, links_refused, links_evicted, links_lost,
+                       bytes_received, bytes_sent))
 
 } // namespace cles::core

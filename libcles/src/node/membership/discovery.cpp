@@ -283,9 +283,10 @@ void discovery::announce_signed(announcement& said) {
     }
 }
 
+// In a secured fleet always, so that nobody can repeat an announcement from another source.
 std::vector<group_source> discovery::sources_in_group() const {
     std::vector<group_source> result;
-    if (const auto& ports = group_->ports(); ports.size() > 1) {
+    if (const auto& ports = group_->ports(); ports.size() > 1 || host_.node().security) {
         for (const auto* port : ports) {
             result.push_back(port->source());
         }
@@ -341,23 +342,13 @@ void discovery::on_solicitation(bool by_name, time_point now) {
 
 // -- announcements of other nodes ----------------------------------------------------------------------------------
 
-void discovery::on_announcement(const group_source& from, const protocol::request_line& update, time_point now) {
+void discovery::on_announcement(heard_announcement heard, time_point now) {
     auto& counts = host_.node().counts;
-    announcement said;
-    std::string why;
-    if (!read_announcement(update, said, why)) {
-        ++counts.announcements_dropped;
-        host_.post_log(log_level::debug, "an announcement from " + host_text(from) + " was dropped: " + why);
-        return;
-    }
-    if (host_.node().security) {
-        said.original = std::make_shared<signed_announcement>(
-            signed_announcement{std::string{update.body}, std::string{update.sig}});
-    }
+    auto& [said, epoch, seq, from, again] = heard;
     if (!group_->is_of_this_host(from)) { // the loopback of another host
         std::erase_if(said.sources, [](const group_source& each) { return each.is_loopback(); });
     }
-    switch (host_.node().peers.apply_announcement(said, *update.epoch, *update.seq, from, now)) {
+    switch (host_.node().peers.apply_announcement(said, epoch, seq, from, now, again)) {
     case membership::verdict::taken:
         ++counts.announcements_received;
         if (const auto& secured = host_.node().secured) {
@@ -365,6 +356,7 @@ void discovery::on_announcement(const group_source& from, const protocol::reques
         }
         break;
     case membership::verdict::duplicate: ++counts.group_repeated; break;
+    case membership::verdict::copied: ++counts.group_copied; break;
     case membership::verdict::old: ++counts.announcements_dropped; break;
     case membership::verdict::refused: ++counts.peers_refused; break;
     case membership::verdict::foreign:

@@ -142,7 +142,7 @@ class discovery final : private announcement_listener, private membership::watch
     void announce(std::chrono::milliseconds interval, bool leaving);
     [[nodiscard]] std::size_t others() const override;
     void on_solicitation(bool by_name, time_point now) override;
-    void on_announcement(const group_source& from, const protocol::request_line& update, time_point now) override;
+    void on_announcement(heard_announcement heard, time_point now) override;
     void on_peer(std::string_view node, membership::change what, std::string_view where) override;
     void probe(std::uint64_t ticket, const std::string& url);
     void follow_incarnation(const std::string& name);

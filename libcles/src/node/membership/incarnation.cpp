@@ -50,9 +50,11 @@ bool incarnation::apply_endpoints(const sighting& w) {
     return true;
 }
 
-// A source on loopback is on this host, so that its Unix sockets and loopback addresses can be used too.
+// A source on loopback is on this host, so that its Unix sockets and loopback addresses can be used too. One that the
+// node itself no longer states is not used any more.
 bool incarnation::is_better_endpoint_source(const sighting& w) const noexcept {
     return endpoints.empty() || (w.from.is_loopback() && !from.is_loopback()) ||
+           (w.is_signed() && std::ranges::find(w.announced.sources, from) == w.announced.sources.end()) ||
            w.announced_at - last_seen_at_source >= announced.interval * 7 / 2;
 }
 
@@ -73,6 +75,9 @@ bool incarnation::on_repeat(const sighting& w) {
     const bool moved = (w.from != from || last_seen_at_source < last_seen) && apply_endpoints(w);
     if (w.from == from) {
         last_seen_at_source = std::max(last_seen_at_source, w.announced_at);
+    }
+    if (w.is_signed()) { // it may be known by gossip, which states none
+        announced.sources = w.announced.sources;
     }
     return moved;
 }

@@ -108,6 +108,7 @@ struct sighting {
     time_point announced_at; ///< when the node itself announced it
     group_source from;       ///< all zeros: received by gossip
     const observed_source& by;
+    bool again = false; ///< of a signed one in the group: it has counted before
 
     [[nodiscard]] bool is_from_gossip() const noexcept { return from == group_source{}; }
     [[nodiscard]] bool is_signed() const noexcept { return announced.original != nullptr; }
@@ -141,8 +142,14 @@ struct incarnation {
     /// known ones.
     bool on_repeat(const sighting& w);
 
-    [[nodiscard]] bool matches(std::uint32_t e, const group_source& f) const noexcept {
-        return epoch == e && (from == group_source{} || f == group_source{} || sends_from(f));
+    /// Whether it is of this incarnation. A signed one in the group states the sources, and a newer one may state
+    /// others.
+    [[nodiscard]] bool matches(const sighting& w) const noexcept {
+        return epoch == w.epoch && (w.is_signed() || w.is_from_gossip() || may_send_from(w.from));
+    }
+    /// Whether `f` is a source of its own, as far as they are known.
+    [[nodiscard]] bool may_send_from(const group_source& f) const noexcept {
+        return from == group_source{} || sends_from(f);
     }
     /// Whether `f` is its source in the group, or one of its announced sources.
     [[nodiscard]] bool sends_from(const group_source& f) const noexcept {

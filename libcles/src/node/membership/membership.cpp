@@ -3,6 +3,7 @@
 
 #include <cles/peer.hpp>
 
+#include "node/membership/reachable_endpoints.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
@@ -17,8 +18,24 @@ namespace cles::core {
 // -- sightings -----------------------------------------------------------------------------------------------------
 
 membership::verdict membership::apply_announcement(const announcement& said, std::uint32_t epoch, std::uint64_t seq,
-                                                   const group_source& from, time_point now) {
-    return take_sighting({said, epoch, seq, now, from, observed_source::of(from)}, now);
+                                                   const group_source& from, time_point now, bool again) {
+    return take_sighting({said, epoch, seq, now, from, observed_source::of(from), again}, now);
+}
+
+const incarnation* membership::find_run(std::string_view node, std::uint32_t epoch) const noexcept {
+    const auto at = peers_.find(node);
+    if (at != peers_.end() && at->second.owner.epoch == epoch) {
+        return &at->second.owner;
+    }
+    const auto* const second = node == own_name_    ? own_name_conflict_.get()
+                               : at == peers_.end() ? nullptr
+                                                    : at->second.second.get();
+    return second != nullptr && second->contender.epoch == epoch ? &second->contender : nullptr;
+}
+
+bool membership::is_elsewhere(std::string_view node, std::uint32_t epoch, const group_source& from) const noexcept {
+    const auto* const run = find_run(node, epoch);
+    return run != nullptr && !run->may_send_from(from);
 }
 
 // A hint: members can send unsigned updates under another name. So it moves nothing, and makes no conflict.
@@ -28,7 +45,9 @@ membership::verdict membership::apply_load(std::string_view node, std::uint32_t 
         return verdict::own;
     }
     const auto at = peers_.find(node);
-    const auto applies_to = [&](const incarnation& r) { return r.announced.original && r.matches(epoch, from); };
+    const auto applies_to = [&](const incarnation& r) {
+        return r.announced.original && r.epoch == epoch && r.may_send_from(from);
+    };
     auto* const second = node == own_name_    ? own_name_conflict_.get()
                          : at == peers_.end() ? nullptr
                                               : at->second.second.get();
@@ -174,12 +193,21 @@ membership::verdict membership::take_sighting(const sighting& w, time_point now)
     if (is_of_ended(w)) {
         return verdict::old;
     }
+    // It may be the last one, by another interface. Otherwise it shows nothing: anybody may have kept it.
+    if (const auto* const run = w.again ? find_run(w.announced.node, w.epoch) : nullptr;
+        w.again && (run == nullptr || run->seq != w.seq)) {
+        return verdict::old;
+    }
     if (own_name) {
         return take_own_name_sighting(w, now);
     }
     const auto at = peers_.find(w.announced.node);
-    if (at != peers_.end() && at->second.owner.matches(w.epoch, w.from)) {
+    if (at != peers_.end() && at->second.owner.matches(w)) {
         return take_owner_sighting(at, w, now);
+    }
+    if (at != peers_.end() && at->second.owner.epoch == w.epoch &&
+        (!at->second.suspect || !at->second.owner.is_older_than(w))) {
+        return take_sighting_elsewhere(at, w, now);
     }
     if (at != peers_.end() && !at->second.suspect) {
         auto& second = at->second.second;
@@ -283,6 +311,28 @@ void membership::on_owner_seen(named_entry& one, bool moved, bool by_gossip, tim
     }
 }
 
+// At the address in use, it is a copy. At another one, it may be one too, since an unspecified address stands for the
+// source; but if the owner does not answer any more where it was, it has moved.
+membership::verdict membership::take_sighting_elsewhere(entries::iterator at, const sighting& w, time_point now) {
+    auto& [name, e] = *at;
+    const auto is_in_use = [&known = e.owner.endpoints](const std::string& url) {
+        return std::ranges::find(known, url) != known.end();
+    };
+    if (w.announced.leaving || w.seq < e.owner.seq ||
+        std::ranges::all_of(reachable_endpoints(w.announced.endpoints, w.by), is_in_use)) {
+        return verdict::copied;
+    }
+    auto& other = e.elsewhere;
+    if (!other || suspect_at(other->contender) <= now) {
+        other = std::make_unique<name_conflict>(
+            name_conflict{incarnation::first(w, revision_), w.announced_at, false, false, {}});
+    } else if (other->contender.sends_from(w.from) && other->contender.is_older_than(w)) {
+        other->contender.apply(w, revision_);
+    }
+    conflicts_.check_owner(name, e.owner, *other, now);
+    return verdict::copied;
+}
+
 membership::verdict membership::take_own_name_sighting(const sighting& w, time_point now) {
     // This node announces as well, which shows that both are live. But gossip may be about its previous incarnation.
     if (own_name_conflict_) {
@@ -298,7 +348,7 @@ membership::verdict membership::take_own_name_sighting(const sighting& w, time_p
 
 membership::verdict membership::take_conflicting_sighting(std::unique_ptr<name_conflict>& second, const sighting& w,
                                                           time_point now) {
-    if (second && second->contender.matches(w.epoch, w.from)) {
+    if (second && second->contender.matches(w)) {
         if (!second->contender.is_older_than(w)) {
             if (w.is_from_gossip() && is_hinted_alive(second->contender, w.announced_at)) {
                 second->contender.on_hint(w.announced_at, revision_);
@@ -343,7 +393,7 @@ void membership::on_probed(std::uint64_t ticket, const probe_outcome& found, tim
     }
     const bool own = *name == own_name_;
     const auto at = own ? peers_.end() : peers_.find(*name);
-    auto* const conflict = own ? own_name_conflict_.get() : at != peers_.end() ? at->second.second.get() : nullptr;
+    auto* const conflict = own ? own_name_conflict_.get() : at != peers_.end() ? at->second.asked_by(ticket) : nullptr;
     if (conflict == nullptr || conflict->check.ticket != ticket) {
         return;
     }
@@ -353,7 +403,12 @@ void membership::on_probed(std::uint64_t ticket, const probe_outcome& found, tim
     switch (conflicts_.on_probed(owner, *conflict, found, now)) {
     case action::none: break;
     case action::owner_gone:
-        if (suspect_at(conflict->contender) > now) {
+        if (suspect_at(conflict->contender) <= now) {
+            break;
+        }
+        if (conflict == at->second.elsewhere.get()) {
+            succeed(at, std::move(conflict->contender));
+        } else {
             end(at, change::gone, now);
         }
         break;
@@ -372,6 +427,7 @@ void membership::on_probed(std::uint64_t ticket, const probe_outcome& found, tim
 void membership::swap_with_contender(entries::iterator at) {
     auto& e = at->second;
     std::swap(e.owner, e.second->contender);
+    e.elsewhere.reset();
     e.since = e.second->first_seen;
     e.owner.described_revision = e.owner.revision = ++revision_;
     freshen(*at);

@@ -33,6 +33,9 @@ namespace cles::core {
 ///
 /// With a prober this is decided sooner, by asking the owner. If it does not answer, the name passes at once; if both
 /// incarnations answer, it is a name conflict.
+///
+/// What carries the owner's epoch is of the owner, and never a conflict, whatever source it is received from: others
+/// may repeat what it sends.
 class membership final : private deadline {
   public:
     enum class change : std::uint8_t {
@@ -66,6 +69,7 @@ class membership final : private deadline {
         own,       ///< this node's own announcement, returned by the group
         old,       ///< outdated, repeated, or of an incarnation that has left
         duplicate, ///< a copy, received by another of several interfaces
+        copied,    ///< from a source that is not one of its node's: others have repeated it
         refused,   ///< the table is full
         unknown,   ///< a heartbeat of an incarnation without a description
         foreign,   ///< of another pool
@@ -94,9 +98,13 @@ class membership final : private deadline {
     }
     [[nodiscard]] const std::string& pool() const noexcept { return own_pool_; }
 
-    /// Applies an announcement received by multicast.
+    /// Applies an announcement received by multicast. One that is signed states the source.
+    /// \param again if it is signed: one of that incarnation with this `seq`, or a later one, has been applied before
     verdict apply_announcement(const announcement& said, std::uint32_t epoch, std::uint64_t seq,
-                               const group_source& from, time_point now);
+                               const group_source& from, time_point now, bool again = false);
+    /// Whether that incarnation has been received in the group, from other sources only.
+    [[nodiscard]] bool is_elsewhere(std::string_view node, std::uint32_t epoch,
+                                    const group_source& from) const noexcept;
     /// Applies a load report received by multicast: the node, known by its signed announcement, is alive, and has this
     /// load. `seq` is that of its last announcement.
     verdict apply_load(std::string_view node, std::uint32_t epoch, std::uint64_t seq, const node_load& load,
@@ -191,7 +199,16 @@ class membership final : private deadline {
         std::unique_ptr<name_conflict> second;
         std::list<named_entry*>::iterator in_revision_order{};
         time_point since{}; // when the owner became known
+        /// The owner, as it is received from a source that is not one of its own, and at another address: others repeat
+        /// its announcements, or its address has changed. Not a conflict.
+        std::unique_ptr<name_conflict> elsewhere{};
 
+        /// For which that probe was sent; null if there is none.
+        [[nodiscard]] name_conflict* asked_by(std::uint64_t ticket) const noexcept {
+            return second && second->check.ticket == ticket         ? second.get()
+                   : elsewhere && elsewhere->check.ticket == ticket ? elsewhere.get()
+                                                                    : nullptr;
+        }
         [[nodiscard]] peer_state state() const noexcept { return suspect ? peer_state::suspect : peer_state::live; }
     };
     using entries = std::map<std::string, entry, std::less<>>;
@@ -209,10 +226,13 @@ class membership final : private deadline {
     incarnation first_sighting(const sighting& w);
     verdict take_sighting(const sighting& w, time_point now);
     verdict take_owner_sighting(entries::iterator at, const sighting& w, time_point now);
+    verdict take_sighting_elsewhere(entries::iterator at, const sighting& w, time_point now);
     verdict take_own_name_sighting(const sighting& w, time_point now);
     verdict take_conflicting_sighting(std::unique_ptr<name_conflict>& second, const sighting& w, time_point now);
     verdict take_leave(const sighting& w, time_point now);
     [[nodiscard]] bool is_of_ended(const sighting& w) const noexcept;
+    /// The incarnation of a name with that epoch, as owner or contender; null if it is not known.
+    [[nodiscard]] const incarnation* find_run(std::string_view node, std::uint32_t epoch) const noexcept;
     [[nodiscard]] bool is_hinted_alive(const incarnation& r, time_point announced_at) const {
         return r.is_hinted_alive(announced_at, interval_of(r.announced, r.from));
     }

@@ -105,6 +105,8 @@ name_conflicts::action name_conflicts::on_probed(const known_owner& owner, name_
         }
         if (found.what == outcome::answered) {
             check.owner_began = now - found.uptime;
+        }
+        if (found.what == outcome::answered && conflict.contender.epoch != owner.epoch) { // otherwise it is the owner
             probe(check, name_check::stage::contender, owner.name, conflict.contender, now);
         }
         return action::none;

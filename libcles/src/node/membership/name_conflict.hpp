@@ -45,7 +45,7 @@ struct name_check {
     time_point owner_began{};
 };
 
-/// Another incarnation (the contender) under a name that is taken.
+/// Another incarnation (the contender) under a name that is taken, or the same one at another address.
 struct name_conflict {
     incarnation contender;
     time_point first_seen{};       ///< the contender

@@ -61,6 +61,10 @@ void group_session::on_datagram(const group_datagram& datagram) {
 bool group_session::serve(const group_datagram& datagram, time_point now) {
     const auto& request = *datagram.request;
     const auto target = request.noun.target;
+    if (group_.is_copy(datagram)) {
+        ++node_->counts.group_copied;
+        return true;
+    }
     if (request.is_update()) {
         return !protocol::is_reserved_target(target) && group_.take(datagram, now);
     }

@@ -188,20 +188,15 @@ void multicast_group::solicited(bool by_name, time_point now) {
     }
 }
 
-// In a secured fleet, a member publishes under its own name, with the epoch that it has confirmed. Announcements are
-// signed, since others pass them on; reports of the load are not.
-bool multicast_group::is_authentic(const group_datagram& datagram) const {
-    const auto& security = node_->security;
-    if (!security) {
-        return true;
-    }
+// In a secured fleet, a member publishes under its own name, with the epoch that it has confirmed.
+bool multicast_group::is_by_its_publisher(const group_datagram& datagram) const noexcept {
     const auto& update = *datagram.request;
-    if (datagram.member != update.noun.target || datagram.epoch != update.epoch) {
-        return false;
-    }
-    return update.noun.task != "cles" || update.noun.path == load_path ||
-           security->is_signed(datagram.member, update.noun.path, *update.seq, protocol::epoch_text(*update.epoch),
-                               update.body, update.sig);
+    return !node_->security || (datagram.member == update.noun.target && datagram.epoch == update.epoch);
+}
+
+bool multicast_group::is_copy(const group_datagram& datagram) const {
+    return node_->security && (!datagram.request->is_update() || datagram.request->noun.path != "cles") &&
+           node_->peers.is_elsewhere(datagram.member, datagram.epoch, datagram.from);
 }
 
 bool multicast_group::take(const group_datagram& datagram, time_point now) {
@@ -209,14 +204,14 @@ bool multicast_group::take(const group_datagram& datagram, time_point now) {
     const auto& from = datagram.from;
     const auto& update = *datagram.request;
     const auto& noun = update.noun;
-    if (!is_authentic(datagram)) {
+    if (!is_by_its_publisher(datagram)) {
         return false;
     }
     if (node_->secured && noun.path == load_path) {
         return datagram.accept() && node_->secured->on_load_report(from, update, now);
     }
     if (noun.task == "cles") {
-        return datagram.accept(true) && take_announcement(from, update, now);
+        return take_announcement(datagram, now);
     }
     auto& counts = node_->counts;
     if (protocol::begins_with_error(update.body) || !feeds_.wants(update) || sources_.is_foreign(from, now) ||
@@ -243,22 +238,58 @@ bool multicast_group::take(const group_datagram& datagram, time_point now) {
     return true;
 }
 
-bool multicast_group::take_announcement(const group_source& from, const protocol::request_line& update,
-                                        time_point now) {
+// Other hosts have the same addresses on loopback.
+bool multicast_group::is_from_stated_source(const group_datagram& datagram, const announcement& said) const {
+    const auto& from = datagram.from;
+    const auto* const run = from.is_loopback() ? node_->peers.announced(datagram.member) : nullptr;
+    const bool is_of_another_host = run != nullptr && run->epoch == datagram.epoch && !is_of_this_host(run->from);
+    return !is_of_another_host && std::ranges::find(said.sources, from) != said.sources.end();
+}
+
+// In a secured fleet, announcements are signed, since others pass them on. Strangers can repeat them from other
+// sources, so the source is checked first, and the signature, which takes longer, after it.
+bool multicast_group::take_announcement(const group_datagram& datagram, time_point now) {
+    using repetition = datagram_admission::repetition;
+    const auto& update = *datagram.request;
+    auto& counts = node_->counts;
     if (!update.noun.parameters.empty() || !is_valid_json(update.body, node_->bounds.depth)) {
         return false;
     }
+    heard_announcement heard{.said = {}, .epoch = *update.epoch, .seq = *update.seq, .from = datagram.from};
+    std::string why;
+    if (!read_announcement(update, heard.said, why)) {
+        ++counts.announcements_dropped;
+        node_->post_log(log_level::debug, "an announcement from " + host_text(heard.from) + " was dropped: " + why);
+        return true;
+    }
+    if (const auto& security = node_->security) {
+        if (!is_from_stated_source(datagram, heard.said)) {
+            ++counts.group_copied;
+            return true;
+        }
+        if (!security->is_signed(datagram.member, update.noun.path, heard.seq, protocol::epoch_text(heard.epoch),
+                                 update.body, update.sig)) {
+            return false;
+        }
+        heard.said.original = std::make_shared<signed_announcement>(
+            signed_announcement{std::string{update.body}, std::string{update.sig}});
+    }
+    const auto found = datagram.accept_announcement(heard.seq);
+    if (found == repetition::refused) {
+        return false;
+    }
+    heard.again = found == repetition::again;
     if (listener_ != nullptr) {
-        listener_->on_announcement(from, update, now);
+        listener_->on_announcement(std::move(heard), now);
     }
     return true;
 }
 
 publisher_sources::verdict publisher_sources::look(std::string_view node, const group_source& from, time_point now) {
     if (const auto* const run = others_.announced(node)) {
-        return !run->sends_from(from)           ? verdict::refused
-               : run->announced.sources.empty() ? verdict::taken
-                                                : verdict::one_of_several;
+        return !run->sends_from(from)               ? verdict::refused
+               : run->announced.sources.size() <= 1 ? verdict::taken
+                                                    : verdict::one_of_several;
     }
     if (const auto found = source_bindings_.find(node); found != source_bindings_.end()) {
         const bool same = found->second.to == from;

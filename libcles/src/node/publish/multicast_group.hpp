@@ -4,6 +4,7 @@
 #include <cles/limits.hpp>
 #include <cles/multicast.hpp>
 
+#include "node/membership/announcement.hpp"
 #include "node/node_state.hpp"
 #include "node/publish/group_feeds.hpp"
 #include "node/publish/group_session.hpp"
@@ -66,6 +67,15 @@ class publisher_sources {
     boost::unordered_flat_map<group_source, time_point> foreign_;
 };
 
+/// An announcement as it was received from the group.
+struct heard_announcement {
+    announcement said;
+    std::uint32_t epoch = 0;
+    std::uint64_t seq = 0;
+    group_source from{};
+    bool again = false; ///< in a secured fleet: one with this `seq`, or a later one, has counted before
+};
+
 /// Receives what the group sends about the reserved task.
 class announcement_listener {
   public:
@@ -74,8 +84,8 @@ class announcement_listener {
     announcement_listener& operator=(const announcement_listener&) = delete;
     /// `BIND all:cles`, or `BIND car1:cles` with this node's name: a node looks for others.
     virtual void on_solicitation(bool by_name, time_point now) = 0;
-    /// `UPDATE car1:cles seq= epoch= {...}` of another node. Its body is valid JSON; views are valid during the call.
-    virtual void on_announcement(const group_source& from, const protocol::request_line& update, time_point now) = 0;
+    /// `UPDATE car1:cles seq= epoch= {...}`, perhaps of this node itself. In a secured fleet, it is authentic.
+    virtual void on_announcement(heard_announcement heard, time_point now) = 0;
 
   protected:
     ~announcement_listener() = default;
@@ -128,6 +138,9 @@ class multicast_group {
     [[nodiscard]] std::shared_ptr<void> keep_owner() const noexcept { return owner_.lock(); }
     /// A node looks for others.
     void solicited(bool by_name, time_point now);
+    /// Whether somebody else has repeated it: it is of a member that sends from other sources. An announcement states
+    /// the sources itself. Asked before it is accepted, so that a copy that arrives first does not keep the other out.
+    [[nodiscard]] bool is_copy(const group_datagram& datagram) const;
     /// An update under a node's name. False if it is not authentic, or of the reserved task and malformed.
     bool take(const group_datagram& datagram, time_point now);
 
@@ -135,8 +148,9 @@ class multicast_group {
     void join(environment& by, const network_interface& interface, const multicast_options& where, bool insecure);
     void join_all(environment& by, const multicast_options& where, bool insecure);
     void join_automatic(environment& by, const multicast_options& where, bool insecure);
-    bool take_announcement(const group_source& from, const protocol::request_line& update, time_point now);
-    [[nodiscard]] bool is_authentic(const group_datagram& datagram) const;
+    bool take_announcement(const group_datagram& datagram, time_point now);
+    [[nodiscard]] bool is_by_its_publisher(const group_datagram& datagram) const noexcept;
+    [[nodiscard]] bool is_from_stated_source(const group_datagram& datagram, const announcement& said) const;
 
     std::shared_ptr<node_state> node_;
     std::weak_ptr<void> owner_;

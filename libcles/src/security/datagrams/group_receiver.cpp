@@ -69,6 +69,15 @@ bool group_receiver::accept(const ticket& t, ordered_by order) {
     return true;
 }
 
+core::datagram_admission::repetition group_receiver::accept_announcement(const ticket& t, std::uint64_t seq) {
+    using repetition = core::datagram_admission::repetition;
+    auto* const known = salts_.find(t.member, t.salt);
+    if (known == nullptr || t.counter < known->window.first()) {
+        return repetition::refused;
+    }
+    return salts_.note_announcement(t.member, *known, seq) ? repetition::first : repetition::again;
+}
+
 bool group_receiver::may_contact(const datagram_source& source, time_point now) {
     while (!contacted_.empty() && now - contacted_.front().at >= between_contacts) {
         contacted_.pop_front();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "port/group_port.hpp"
 #include "security/datagrams/datagram_format.hpp"
 #include "security/datagrams/datagram_path.hpp"
 #include "security/datagrams/entropy.hpp"
@@ -60,6 +61,8 @@ class group_receiver {
     };
     /// Whether a line that was opened counts. \pre its source has been checked
     [[nodiscard]] bool accept(const ticket& t, ordered_by order);
+    /// The same for an announcement whose signature has been verified, too.
+    [[nodiscard]] core::datagram_admission::repetition accept_announcement(const ticket& t, std::uint64_t seq);
 
   private:
     struct recent_contact {

@@ -36,6 +36,13 @@ void salt_table::learn(std::uint32_t member, const group_salt& salt, std::uint32
                      .updates = replay_window{first_counter}});
 }
 
+bool salt_table::note_announcement(std::uint32_t member, known_salt& salt, std::uint64_t seq) {
+    const auto counts = std::ranges::all_of(
+        members_[member], [&](const known_salt& each) { return each.epoch != salt.epoch || each.announced < seq; });
+    salt.announced = std::max(salt.announced, seq);
+    return counts;
+}
+
 void salt_table::forget(std::uint32_t member, std::span<const std::uint8_t> beginning) {
     if (const auto salts = members_.find(member); salts != members_.end()) {
         std::erase_if(salts->second, [beginning](const known_salt& each) {

@@ -26,7 +26,8 @@ class salt_table {
         group_salt salt;
         std::uint32_t epoch;
         replay_window window;
-        replay_window updates; ///< of messages that may overtake all others
+        replay_window updates;       ///< of messages that may overtake all others
+        std::uint64_t announced = 0; ///< the greatest signed `seq` of an announcement that has counted
     };
 
     explicit salt_table(fleet& of);
@@ -35,6 +36,10 @@ class salt_table {
     [[nodiscard]] known_salt* find(std::uint32_t member, const group_salt& salt);
     /// Takes a salt of a member as its newest one. The window of a known one stays: it knows what has been received.
     void learn(std::uint32_t member, const group_salt& salt, std::uint32_t epoch, std::uint64_t first_counter);
+
+    /// Notes the signed `seq` of an announcement under a known salt. Returns whether it is greater than all others of
+    /// that member and epoch, whatever their salt: any member can seal as another one, but not sign.
+    [[nodiscard]] bool note_announcement(std::uint32_t member, known_salt& salt, std::uint64_t seq);
 
     /// Forgets the salts of a member that begin so.
     void forget(std::uint32_t member, std::span<const std::uint8_t> beginning);

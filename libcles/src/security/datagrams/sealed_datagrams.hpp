@@ -66,6 +66,10 @@ class sealed_datagrams final : private datagram_sink {
     [[nodiscard]] bool accept(const group_receiver::ticket& t, group_receiver::ordered_by order) {
         return receiver_.accept(t, order);
     }
+    [[nodiscard]] core::datagram_admission::repetition accept_announcement(const group_receiver::ticket& t,
+                                                                           std::uint64_t seq) {
+        return receiver_.accept_announcement(t, seq);
+    }
     /// See `group_sender::seal`.
     [[nodiscard]] bytes_view seal_for_group(std::string_view line) { return sender_.seal(line); }
 

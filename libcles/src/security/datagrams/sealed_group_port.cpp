@@ -42,6 +42,7 @@ class group_admission final : public core::datagram_admission {
         return by_.accept(ticket_,
                           is_signed ? group_receiver::ordered_by::signed_seq : group_receiver::ordered_by::counter);
     }
+    repetition accept_announcement(std::uint64_t seq) override { return by_.accept_announcement(ticket_, seq); }
 
   private:
     sealed_datagrams& by_;

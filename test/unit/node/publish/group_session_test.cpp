@@ -26,10 +26,9 @@ class recording_presence final : public cles::core::announcement_listener {
     void on_solicitation(bool by_name, cles::time_point) override {
         told.emplace_back(by_name ? "solicited by name" : "solicited");
     }
-    void on_announcement(const group_source& from, const cles::protocol::request_line& update,
-                         cles::time_point) override {
-        told.push_back(std::to_string(from.port) + " " + std::string{update.noun.target} + " " +
-                       std::to_string(*update.seq) + " " + std::string{update.body});
+    void on_announcement(cles::core::heard_announcement heard, cles::time_point) override {
+        told.push_back(std::to_string(heard.from.port) + " " + heard.said.node + " " + std::to_string(heard.seq) + " " +
+                       cles::protocol::epoch_text(heard.epoch) + (heard.said.original ? " signed" : ""));
     }
     std::vector<std::string> told;
 };
@@ -68,7 +67,7 @@ BOOST_AUTO_TEST_CASE(an_announcement_is_passed_to_the_listener) {
     hear(R"(UPDATE car2:cles seq=3 epoch=5f3a09c1 {"node":"car2"})"
          "\n");
     BOOST_REQUIRE(membership.told.size() == 1U);
-    BOOST_TEST(membership.told[0] == R"(4001 car2 3 {"node":"car2"})");
+    BOOST_TEST(membership.told[0] == "4001 car2 3 5f3a09c1");
     BOOST_TEST(node.counts().group_received == 1U);
     BOOST_TEST(node.counts().group_dropped == 0U);
 }

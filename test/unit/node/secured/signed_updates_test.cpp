@@ -40,6 +40,7 @@ struct admission final : cles::core::datagram_admission {
         ++(is_signed ? of_signed : of_others);
         return is_signed || answer;
     }
+    repetition accept_announcement(std::uint64_t) override { return repetition::first; }
 
     bool answer = true;
     int of_signed = 0;
