@@ -17,6 +17,7 @@
 #include <optional>
 #include <utility>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 namespace jadc2 {
@@ -248,7 +249,7 @@ void mission::show() {
 
 boost::asio::awaitable<void> mission::read_orders() {
     boost::system::error_code error;
-    keyboard_.assign(::dup(STDIN_FILENO), error);
+    keyboard_.assign(::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0), error);
     std::string text;
     while (!ending_ && !error) {
         const auto [code, size] =

@@ -34,6 +34,7 @@
 #include <string>
 #include <vector>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 namespace {
@@ -131,7 +132,7 @@ class fleet {
     }
 
     asio::awaitable<void> wait_for_line() {
-        asio::posix::stream_descriptor in{io_, ::dup(STDIN_FILENO)};
+        asio::posix::stream_descriptor in{io_, ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)};
         asio::streambuf line;
         co_await asio::async_read_until(in, line, '\n', asio::use_awaitable);
     }

@@ -26,15 +26,15 @@ std::atomic<int> attempts{0};
 } // namespace
 
 // Replaces the C library's function in the whole program: fails when a test requires it.
-extern "C" int accept(int descriptor, sockaddr* address, socklen_t* length) {
-    using function = int (*)(int, sockaddr*, socklen_t*);
-    static const auto real = reinterpret_cast<function>(::dlsym(RTLD_NEXT, "accept"));
+extern "C" int accept4(int descriptor, sockaddr* address, socklen_t* length, int flags) {
+    using function = int (*)(int, sockaddr*, socklen_t*, int);
+    static const auto real = reinterpret_cast<function>(::dlsym(RTLD_NEXT, "accept4"));
     if (const auto error = fails_with.load()) {
         ++attempts;
         errno = error;
         return -1;
     }
-    return real(descriptor, address, length);
+    return real(descriptor, address, length, flags);
 }
 
 BOOST_AUTO_TEST_SUITE(acceptor)

@@ -17,6 +17,7 @@
 #include <string>
 #include <string_view>
 
+#include <fcntl.h>
 #include <net/if.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -45,6 +46,9 @@ class group_probe {
         membership.imr_multiaddr.s_addr = htonl(group_.address().to_v4().to_uint());
         membership.imr_ifindex = static_cast<int>(::if_nametoindex(interface.c_str()));
 
+        for (const auto* each : {&listener_, &sender_}) { // no program that is started here inherits them
+            ::fcntl(const_cast<udp::socket*>(each)->native_handle(), F_SETFD, FD_CLOEXEC);
+        }
         listener_.set_option(asio::socket_base::reuse_address{true});
         step = "listen at udp port " + std::to_string(options.port);
         listener_.bind(group_);

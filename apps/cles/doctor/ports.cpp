@@ -18,6 +18,8 @@
 #include <string>
 #include <string_view>
 
+#include <fcntl.h>
+
 namespace tool {
 
 using namespace std::chrono_literals;
@@ -69,6 +71,7 @@ boost::system::error_code try_to_bind(asio::io_context& io) {
     boost::system::error_code code;
     typename Protocol::socket socket{io};
     socket.open(Protocol::v4(), code);
+    ::fcntl(socket.native_handle(), F_SETFD, FD_CLOEXEC);
     if constexpr (std::same_as<Protocol, asio::ip::tcp>) {
         socket.set_option(asio::socket_base::reuse_address{true}, code); // as nodes do; it allows no second listener
     }

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include <fcntl.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
@@ -41,7 +42,7 @@ winsize size_of_terminal() {
 class screen::key_reader {
   public:
     key_reader(asio::io_context& io, const termios& before, std::function<void()> on_quit)
-        : before_(before), input_(io, ::dup(STDIN_FILENO)), on_quit_(std::move(on_quit)) {
+        : before_(before), input_(io, ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)), on_quit_(std::move(on_quit)) {
         auto quiet = before;
         quiet.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
         // Linux sends the signal of ^C and then decides whether to echo it. Unless it flushes in between, the terminal

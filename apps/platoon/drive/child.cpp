@@ -26,7 +26,7 @@ namespace {
     if (::getppid() != parent) {
         ::_exit(127); // the parent has ended meanwhile
     }
-    const int nothing = ::open("/dev/null", O_RDONLY);
+    const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
     ::dup2(nothing, STDIN_FILENO);
     ::dup2(out, STDOUT_FILENO);
     ::dup2(err, STDERR_FILENO);

@@ -102,7 +102,7 @@ std::string summary_of(const recording& drive) {
 }
 
 void check_writable(const std::string& path) {
-    auto* file = std::fopen(path.c_str(), "a");
+    auto* file = std::fopen(path.c_str(), "ae");
     if (file == nullptr) {
         throw_cannot_write(path, errno);
     }
@@ -111,7 +111,7 @@ void check_writable(const std::string& path) {
 
 void write(const recording& drive, const std::string& path) {
     const auto text = cles::to_json(drive) + "\n";
-    auto* file = std::fopen(path.c_str(), "w");
+    auto* file = std::fopen(path.c_str(), "we");
     if (file == nullptr) {
         throw_cannot_write(path, errno);
     }

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <utility>
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -125,6 +126,8 @@ int make_descriptor() {
 struct nats_connection::callbacks {
     static natsStatus attach(void** data, void* loop, natsConnection*, natsSock socket) {
         *data = loop;
+        // The library opens it without. While the connection is made, a child would still inherit it.
+        ::fcntl(socket, F_SETFD, FD_CLOEXEC);
         with(loop, [socket](nats_connection& c) { c.socket_ = socket; });
         return NATS_OK;
     }

@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <utility>
 
+#include <fcntl.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/time.h>
@@ -50,6 +51,7 @@ struct tls_watch::callbacks {
         const timeval limit{.tv_sec = seconds.count(),
                             .tv_usec = std::chrono::microseconds{self->limit_ - seconds}.count()};
         const int socket = ::SSL_get_fd(connection); // it blocks until the handshake is done
+        ::fcntl(socket, F_SETFD, FD_CLOEXEC);
         static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit));
         static_cast<void>(::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &limit, sizeof limit));
     }

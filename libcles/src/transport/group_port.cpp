@@ -5,6 +5,7 @@
 
 #include "protocol/request_line.hpp"
 #include "transport/member_handler.hpp"
+#include "transport/private_socket.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/execution/context.hpp>
@@ -148,7 +149,7 @@ class group_receiver : public std::enable_shared_from_this<group_receiver> {
 
 group_receiver::group_receiver(const asio::any_io_executor& executor, const core::network_interface& by,
                                const udp::endpoint& group)
-    : group_(group), interface_(by.index), socket_(executor, udp::v4()) {
+    : group_(group), interface_(by.index), socket_(make_private<udp::socket>(executor, udp::v4())) {
     socket_.set_option(asio::socket_base::reuse_address{true});
     set_ip_option(socket_, IP_MULTICAST_ALL, 0); // otherwise it receives groups that other programs have joined
     socket_.bind(group_);
@@ -316,7 +317,7 @@ receiver_of(const asio::any_io_executor& executor, const core::network_interface
 group_port::group_port(const asio::any_io_executor& executor, const core::network_interface& by,
                        const multicast_options& where)
     : group_(asio::ip::make_address_v4(where.group), where.port), receiver_(receiver_of(executor, by, group_)),
-      own_(executor, udp::v4()), burst_(own_) {
+      own_(make_private<udp::socket>(executor, udp::v4())), burst_(own_) {
     own_.bind({asio::ip::address_v4{by.address}, 0});
     set_ip_option(own_, IP_MULTICAST_IF, membership(group_, by.index));
     set_ip_option(own_, IP_MULTICAST_TTL, 1);

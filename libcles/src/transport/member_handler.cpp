@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/member_handler.hpp"
 
+#include <boost/asio/basic_socket_acceptor.hpp>
 #include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/ip/udp.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
@@ -17,6 +18,8 @@ void wait(Device& device, typename Device::wait_type until, member_handler&& cal
 template void wait(asio::ip::udp::socket& device, asio::socket_base::wait_type until, member_handler&& call);
 template void wait(asio::generic::stream_protocol::socket& device, asio::socket_base::wait_type until,
                    member_handler&& call);
+template void wait(asio::basic_socket_acceptor<asio::generic::stream_protocol>& device,
+                   asio::socket_base::wait_type until, member_handler&& call);
 template void wait(asio::posix::stream_descriptor& device, asio::posix::descriptor_base::wait_type until,
                    member_handler&& call);
 

@@ -45,7 +45,7 @@ class member_handler {
 // `async_wait` and `post` with such a handler. They are not templates of the source that uses them, since most of these
 // are optimised for size, and messages wait for some.
 
-/// `Device` is a UDP or stream socket, or a descriptor.
+/// `Device` is a UDP or stream socket, an acceptor of streams, or a descriptor.
 template <class Device>
 void wait(Device& device, typename Device::wait_type until, member_handler&& call);
 void wait(boost::asio::steady_timer& timer, member_handler&& call);

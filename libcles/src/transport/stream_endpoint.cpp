@@ -33,7 +33,14 @@ void stream_dialler::on_timeout(error_code code) {
 }
 
 void stream_dialler::connect() {
-    socket_.async_connect(where_[tried_++], member_handler::calling<&stream_dialler::on_connected>(shared_from_this()));
+    const auto& where = where_[tried_++];
+    error_code code;
+    open_private(socket_, where.protocol(), code);
+    if (code) {
+        post_call<&stream_dialler::on_connected>(socket_.get_executor(), shared_from_this(), code);
+    } else {
+        socket_.async_connect(where, member_handler::calling<&stream_dialler::on_connected>(shared_from_this()));
+    }
 }
 
 void stream_dialler::on_connected(error_code code) {
@@ -115,30 +122,25 @@ bool is_the_peers(const error_code& code) {
 
 stream_acceptor::stream_acceptor(listening_socket socket, url local, const limits& bounds, identify_function identify,
                                  codec_maker make_codec)
-    : acceptor_(std::move(socket)), local_(std::move(local)), pause_(acceptor_.get_executor()), bounds_(bounds),
-      identify_(std::move(identify)), make_codec_(std::move(make_codec)) {}
+    : acceptor_(std::move(socket)), protocol_(acceptor_.local_endpoint().protocol()), local_(std::move(local)),
+      pause_(acceptor_.get_executor()), bounds_(bounds), identify_(std::move(identify)),
+      make_codec_(std::move(make_codec)) {}
 
 void stream_acceptor::start(std::function<void(link_ptr)> on_link) {
     on_link_ = std::move(on_link);
-    accept();
+    acceptor_.native_non_blocking(true);
+    wait();
 }
 
 void stream_acceptor::accept_waiting() {
-    accepts_waiting_ = true;
     error_code code;
-    acceptor_.non_blocking(true, code);
-    while (!code && on_link_) {
-        stream_socket socket{acceptor_.get_executor()};
-        acceptor_.accept(socket, code);
-        if (!code) {
-            hand_over(std::move(socket));
-        }
+    while (accept_one(code)) {
     }
 }
 
 void stream_acceptor::close() {
     error_code ignored;
-    acceptor_.close(ignored); // ends the pending accept, which releases the callback
+    acceptor_.close(ignored); // ends the wait, which releases the callback
     pause_.cancel();
 }
 
@@ -152,19 +154,36 @@ void stream_acceptor::hand_over(stream_socket socket) {
     on_link_(made);
 }
 
-void stream_acceptor::accept() {
-    acceptor_.async_accept([self = shared_from_this()](error_code code, stream_socket socket) {
-        if (!code && self->on_link_ && (self->acceptor_.is_open() || self->accepts_waiting_)) {
-            self->hand_over(std::move(socket));
-        }
-        if (!self->acceptor_.is_open() || !self->on_link_) {
-            self->on_link_ = nullptr;
-        } else if (!code || is_the_peers(code)) {
-            self->accept();
-        } else {
-            self->accept_later();
-        }
-    });
+void stream_acceptor::wait() {
+    wait_call<&stream_acceptor::on_readable>(acceptor_, asio::socket_base::wait_read, shared_from_this());
+}
+
+// Other tasks of the executor have their turn after some connections.
+void stream_acceptor::on_readable(error_code code) {
+    constexpr int per_turn = 16;
+    for (int left = per_turn; left != 0 && accept_one(code); --left) {
+    }
+    if (!acceptor_.is_open() || !on_link_) {
+        on_link_ = nullptr;
+    } else if (!code || code == asio::error::would_block) {
+        wait();
+    } else {
+        accept_later();
+    }
+}
+
+bool stream_acceptor::accept_one(error_code& code) {
+    if (code || !on_link_ || !acceptor_.is_open()) {
+        return false;
+    }
+    stream_socket socket{acceptor_.get_executor()};
+    accept_private(acceptor_, protocol_, socket, code);
+    if (!code) {
+        hand_over(std::move(socket));
+    } else if (is_the_peers(code)) {
+        code.clear();
+    }
+    return !code;
 }
 
 void stream_acceptor::accept_later() {
@@ -174,7 +193,7 @@ void stream_acceptor::accept_later() {
 
 void stream_acceptor::after_pause(error_code code) {
     if (!code && acceptor_.is_open()) {
-        accept();
+        wait();
     }
 }
 

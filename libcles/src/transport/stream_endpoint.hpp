@@ -3,9 +3,9 @@
 
 #include <cles/link.hpp>
 
+#include "transport/private_socket.hpp"
 #include "transport/stream_link.hpp"
 
-#include <boost/asio/basic_socket_acceptor.hpp>
 #include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/steady_timer.hpp>
 
@@ -18,9 +18,7 @@
 
 namespace cles::transport {
 
-using stream_socket = stream_link::socket_type;
 using stream_address = boost::asio::generic::stream_protocol::endpoint;
-using listening_socket = boost::asio::basic_socket_acceptor<boost::asio::generic::stream_protocol>;
 
 /// Prepares a connected socket and returns the identity of its peer.
 using identify_function = std::function<identity(stream_socket&)>;
@@ -73,19 +71,22 @@ class stream_acceptor : public acceptor, public std::enable_shared_from_this<str
     void close() override;
 
   private:
-    void accept();
+    void wait();
+    void on_readable(boost::system::error_code code);
+    /// Whether there may be more.
+    [[nodiscard]] bool accept_one(boost::system::error_code& code);
     void accept_later();
     void after_pause(boost::system::error_code code);
     void hand_over(stream_socket socket);
 
     listening_socket acceptor_;
+    boost::asio::generic::stream_protocol protocol_;
     url local_;
     boost::asio::steady_timer pause_;
     limits bounds_;
     identify_function identify_;
     codec_maker make_codec_;
     std::function<void(link_ptr)> on_link_;
-    bool accepts_waiting_ = false; // even what completes after `close`
 };
 
 } // namespace cles::transport

@@ -80,8 +80,7 @@ class tcp_transport final : public link_transport {
 std::unique_ptr<acceptor> listen_tcp(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                      codec_maker make_codec) {
     const tcp::endpoint endpoint{resolve(where), where.port};
-    listening_socket socket{executor};
-    socket.open(endpoint.protocol());
+    auto socket = make_private<listening_socket>(executor, endpoint.protocol());
     socket.set_option(asio::socket_base::reuse_address{true});
     if (endpoint.address().is_v6()) {
         socket.set_option(asio::ip::v6_only{true});

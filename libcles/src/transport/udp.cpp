@@ -3,6 +3,7 @@
 
 #include "transport/ip_host.hpp"
 #include "transport/member_handler.hpp"
+#include "transport/private_socket.hpp"
 #include "transport/transports.hpp"
 
 #include <boost/asio/error.hpp>
@@ -446,7 +447,7 @@ link_ptr connect(const asio::any_io_executor& executor, const url& where, const 
     }
     udp::socket socket{executor};
     if (!code) {
-        socket.open(endpoint.protocol(), code);
+        open_private(socket, endpoint.protocol(), code);
     }
     if (!code) {
         set_traffic_class(socket.native_handle(), where, code);
@@ -482,8 +483,7 @@ class udp_transport final : public link_transport {
 std::unique_ptr<acceptor> listen_udp(const asio::any_io_executor& executor, const url& where,
                                      std::unique_ptr<datagram_codec> codec) {
     const udp::endpoint endpoint{resolve(where), where.port};
-    udp::socket socket{executor};
-    socket.open(endpoint.protocol());
+    auto socket = make_private<udp::socket>(executor, endpoint.protocol());
     if (endpoint.address().is_v6()) {
         socket.set_option(asio::ip::v6_only{true});
     }

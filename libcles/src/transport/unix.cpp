@@ -53,7 +53,7 @@ bool is_stale(const std::string& path, const stream_address& endpoint) {
         return false;
     }
     asio::io_context unused;
-    stream_socket probe{unused};
+    auto probe = make_private<stream_socket>(unused.get_executor(), endpoint.protocol());
     error_code code;
     probe.connect(endpoint, code);
     return code == asio::error::connection_refused;
@@ -98,8 +98,7 @@ class unix_transport final : public link_transport {
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
                                      const limits& bounds) override {
         const auto endpoint = address_of(where);
-        listening_socket socket{executor};
-        socket.open(endpoint.protocol());
+        auto socket = make_private<listening_socket>(executor, endpoint.protocol());
         error_code code;
         bind(socket, endpoint, code);
         if (code == asio::error::address_in_use && !where.path.starts_with('@') && is_stale(where.path, endpoint)) {

@@ -12,6 +12,7 @@
 #include <exception>
 #include <utility>
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
 
@@ -394,7 +395,7 @@ void plugin_session::read_rest() {
 void plugin_session::run() {
     control_stream_.emplace(executor_, process_.control.release());
     output_stream_.emplace(executor_, process_.output.release());
-    end_stream_.emplace(executor_, ::dup(process_.handle()));
+    end_stream_.emplace(executor_, ::fcntl(process_.handle(), F_DUPFD_CLOEXEC, 0));
     read_pause_.emplace(executor_);
     watch_.emplace(executor_);
     wait_to_read();

@@ -49,6 +49,10 @@ class Federation(BridgesTest):
         self.assertEqual(json.loads(hub.ask("PULL north.gate:nothing"))["error"], "no_task")
         self.assertEqual(json.loads(hub.ask("PUSH north.gate:cles/cancel/1"))["error"], "no_target")
 
+    def test_programs_that_a_bridge_starts_inherit_no_descriptor(self):
+        _, hub, gate = self.two_pools()
+        self.assertEqual(hub.inherited() + gate.inherited(), [])
+
     def test_requests_reach_nodes_behind_the_bridges(self):
         server = self.server()
         hub, gate = self.node("hub", "south", server), self.node("gate", "north", server)

@@ -139,6 +139,10 @@ class Ends(Isolated):
         figures = self.figures()
         self.assertEqual((figures["name"], figures["state"], figures["ended"]), ("hostile", "running", 1))
 
+    def test_no_other_program_inherits_what_it_needs_for_the_process(self):
+        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+        self.assertEqual(self.daemon.inherited(), [])
+
     def test_segmentation_fault(self):
         # A sanitizer reports it, and ends the process in a way of its own.
         self.ends("DELEGATE self:crashes", "ended" if SANITIZED else r"was ended by signal 11 \(SIGSEGV\)")

@@ -10,7 +10,7 @@ import time
 import unittest
 
 from daemon import DEFAULTS, STUBBORN, Daemon, body, clean_environment, clesd, wait_until_running
-from support import PATIENCE, wait_until
+from support import PATIENCE, free_port, wait_until
 
 STUBBORN_TASKS = f"plugins: [{STUBBORN}]\n"
 
@@ -58,6 +58,21 @@ class Start(unittest.TestCase):
                 code, took = d.stop(number)
                 self.assertEqual(code, 0)
                 self.assertLess(took, 4)  # there is nothing to wait for
+
+    def test_programs_that_it_starts_inherit_no_descriptor(self):
+        name = f"clesd-inherited-{os.getpid()}"
+        base = DEFAULTS.replace("tcp://127.0.0.1:0", f"[tcp://127.0.0.1:0, udp://127.0.0.1:0, 'unix://@{name}']")
+        group = f"multicast: {{interface: lo, port: {free_port()}}}"
+        with Daemon(base=base.replace("multicast: off", group)) as d:
+            with d.connect() as link, socket.socket(socket.AF_UNIX) as local:
+                local.connect(f"\0{name}")
+                local.sendall(b"PULL self:cles\n")
+                self.assertIn(b"sat1", local.recv(65536))
+                self.assertEqual(json.loads(link.ask("PULL self:cles"))["node"], "sat1")
+                with Daemon(f"seeds: ['{d.url}']\n", base=DEFAULTS.replace("sat1", "sat2")) as other:
+                    wait_until(lambda: "sat1" in known_to(other), "it has a link")
+                    self.assertEqual(other.inherited(), [])
+                self.assertEqual(d.inherited(), [])
 
     def test_the_json_log_has_an_object_per_line(self):
         with Daemon() as d:
