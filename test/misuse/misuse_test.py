@@ -97,6 +97,10 @@ WRONG = {
         "a BIND handler must be a plain function",
     ),
     # Calls.
+    "wide_integer": (
+        "__extension__ typedef __int128 wide; std::string f(wide number) { return cles::to_json(number); }",
+        "this type cannot be written as JSON",
+    ),
     "undescribed_body": (
         coroutine('const undescribed body{}; co_await node.async_push("a:b", body);'),
         "this type cannot be written as JSON",

@@ -141,6 +141,23 @@ RESERVED_HEADERS = [
 # These add seconds to the compile time of every user of the header.
 HEAVY_IN_PUBLIC = re.compile(r"boost/asio\.hpp$|boost/asio/(use_future|experimental/awaitable_operators)\.hpp$|boost/json\.hpp$")
 
+# Descriptors that programs started by this one would inherit. Asio opens and accepts sockets so.
+INHERITED = [
+    (re.compile(r"(?<![\w>])::(socket|accept4|open|openat|pipe2|socketpair|eventfd|timerfd_create|memfd_create|epoll_create1)\s*\((?!.*CLOEXEC)",
+                re.DOTALL), "close-on-exec is missing"),
+    (re.compile(r"(?<![\w>])::(dup|pipe|accept)\s*\("), "programs that are started inherit it: use a function that sets close-on-exec"),
+]
+INHERITED_LAYERS = LIBRARY | {"runtime", "apps", "plugins"}
+INHERITED_OF_ASIO = re.compile(r"\basync_accept\b|\bacceptor_?\.accept\(|\.open\([^;]*(protocol\(\)|::v[46]\(\))"
+                               r"|(?<!make_private<udp::socket>)[({]\w+, *(\w+::)*(udp|tcp)::v[46]\(\)")
+
+# In public headers, templates of functions are called by their qualified names: otherwise a function of that name in the
+# namespace of the user's type may be called instead. For the same reason, nothing is taken apart by structured bindings.
+FUNCTION_TEMPLATE = re.compile(r"^template <[^\n]*\n(?:[ \t}>][^\n]*\n|template <[^\n]*\n)*"
+                               r"(?!struct|class|using|concept|union|extern|friend)[^\n=(]*?(?<!::)\b(?!operator|decltype|requires)(\w+)\(",
+                               re.MULTILINE)
+STRUCTURED_BINDING = re.compile(r"\bauto\s*&{0,2}\s*\[")
+
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.MULTILINE)
 
 
@@ -228,6 +245,12 @@ class Tree:
                     self.texts[path.relative_to(root).as_posix()] = path.read_text(encoding="utf-8")
         self.includes = {name: includes_of(text) for name, text in self.texts.items()}
         self.reasons: dict[str, str] = {}
+        names = {name for file, text in self.texts.items() if self.layer_of(file) == "public"
+                 for name in FUNCTION_TEMPLATE.findall(without_comments_and_strings(text))}
+        # Without arguments, or after the name of a type (a declaration), nothing is looked up.
+        self.unqualified_call = re.compile(
+            r"^[ \t]+(?:.*?(?:[^\w:.>~ \t]|\breturn|\bco_return|\bco_await|\belse)[ \t]*)?\b(%s)(?:<[^()\n]*>)?\((?!\))"
+            % "|".join(sorted(names)), re.MULTILINE) if names else None
 
     def complain(self, name: str, line: int, what: str) -> None:
         self.violations.append(f"{name}:{line}: {what}")
@@ -327,6 +350,22 @@ class Tree:
                     if match.group(0).removeprefix("std::") in WITHOUT_IO.get(name, set()):
                         continue
                     self.complain(name, clean.count("\n", 0, match.start()) + 1, f"'{match.group(0)}': sans-I/O code {what}")
+        if layer in INHERITED_LAYERS:
+            for line, statement in statements_of(clean):
+                for pattern, what in INHERITED:
+                    if match := pattern.search(statement):
+                        self.complain(name, line, f"'{match.group(0)[:40]}': {what}")
+        if layer in LIBRARY and name != "libcles/src/transport/private_socket.hpp":
+            for match in INHERITED_OF_ASIO.finditer(clean):
+                self.complain(name, clean.count("\n", 0, match.start()) + 1,
+                              f"'{match.group(0)}': programs that are started inherit it: use transport/private_socket.hpp")
+        if layer == "public":
+            for match in self.unqualified_call.finditer(clean) if self.unqualified_call else ():
+                self.complain(name, clean.count("\n", 0, match.start(1)) + 1,
+                              f"'{match.group(1)}(' is not qualified: a user's function of that name may be called instead")
+            for match in STRUCTURED_BINDING.finditer(clean):
+                self.complain(name, clean.count("\n", 0, match.start()) + 1,
+                              "a structured binding may call a user's 'get': name the members")
         if "co_await" in clean:
             for line, statement in statements_of(clean):
                 if has_conditional_await(statement):
@@ -353,6 +392,10 @@ class Tree:
 # A tree that follows the rules, including code that only looks forbidden.
 GOOD = {
     "libcles/include/cles/error.hpp": "#pragma once\n#include <string>\n",
+    "libcles/include/cles/convert.hpp": "#pragma once\ntemplate <class T>\nvoid write(const T& value);\n\n"
+    "template <class T>\n    requires(true)\nvoid twice(const T& value) {\n    cles::write(value); // write(value)\n"
+    "    out.write(value);\n}\nstruct sink {\n    void write(int value);\n};\n",
+    "libcles/src/transport/private_socket.cpp": "int f() { return ::socket(1, 2 | SOCK_CLOEXEC, 0); }\n",
     "libcles/include/cles/link.hpp": "#pragma once\n#include <cles/error.hpp>\n#include <boost/asio/awaitable.hpp>\n",
     "libcles/include/cles/registrar.hpp": "#pragma once\n#include <cles/link.hpp>\n",
     "libcles/include/cles/service.hpp": "#pragma once\n#include <boost/asio/io_context.hpp>\n",
@@ -419,6 +462,14 @@ PLANTED = [
     ("libcles/include/cles/a.hpp", "#include <boost/asio/use_future.hpp>\n", "costs every user seconds"),
     ("libcles/include/cles/a.hpp", "#include <boost/asio/experimental/awaitable_operators.hpp>\n", "costs every user seconds"),
     ("libcles/include/cles/a.hpp", "#include <boost/asio.hpp>\n", "costs every user seconds"),
+    ("libcles/include/cles/a.hpp", "template <class T>\nvoid f(const T& value) {\n    write(value);\n}\n", "'write(' is not qualified"),
+    ("libcles/include/cles/a.hpp", "template <class T>\nbool f(T& value) {\n    return twice(value);\n}\n", "'twice(' is not"),
+    ("libcles/include/cles/a.hpp", "template <class T>\nvoid f(T& all) {\n    for (auto& [a, b] : all) {\n    }\n}\n", "structured binding"),
+    ("libcles/src/transport/a.cpp", "void f() { socket.open(where.protocol(), code); }\n", "use transport/private_socket.hpp"),
+    ("libcles/src/transport/a.cpp", "a::a() : socket_(executor, udp::v4()) {}\n", "use transport/private_socket.hpp"),
+    ("libcles/src/transport/a.cpp", "void f() { acceptor_.async_accept(g); }\n", "use transport/private_socket.hpp"),
+    ("runtime/a.cpp", "int f() { return ::socket(1, 2, 0); }\n", "close-on-exec is missing"),
+    ("apps/a.cpp", "int f() { return ::dup(0); }\n", "programs that are started inherit it"),
     ("apps/a.cpp", '#include "../libcles/src/node/session.hpp"\n', "apps must not include node"),
     ("apps/a.cpp", '#include "protocol/line.hpp"\n', "apps must not include protocol"),
     ("apps/a.cpp", "#include <yaml-cpp/yaml.h>\n", "runtime/config alone"),

@@ -25,13 +25,14 @@ class awaited_event final : public pending_event {
         if (!target_.read(event, target_.value, code, why)) {
             return false;
         }
-        end_operation(this, complete_, code, why);
+        detail::end_operation(this, complete_, code, why);
         return true;
     }
     void fail(boost::system::error_code code, std::string_view message) override {
-        end_operation(this, complete_, code, std::string{message}); // the view may refer to memory of the handler
+        detail::end_operation(this, complete_, code,
+                              std::string{message}); // the view may refer to memory of the handler
     }
-    void discard() noexcept override { discard_operation(this, complete_); }
+    void discard() noexcept override { detail::discard_operation(this, complete_); }
     [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
@@ -42,9 +43,9 @@ class awaited_event final : public pending_event {
 template <class Handler>
 void awaited_next::start(Handler handler) {
     if (from.control) {
-        start_next<awaited_event<Handler>>(from, std::move(handler), target);
+        detail::start_next<awaited_event<Handler>>(from, std::move(handler), target);
     } else {
-        fail_later<true>(std::move(handler), from.fallback, errc::closed, not_open);
+        detail::fail_later<true>(std::move(handler), from.fallback, errc::closed, not_open);
     }
 }
 

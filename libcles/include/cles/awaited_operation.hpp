@@ -31,7 +31,7 @@ class awaited_operation final : public pending {
     void fail(boost::system::error_code code, std::string_view message) override {
         finish(code, std::string{message}); // the view may refer to memory of the handler
     }
-    void discard() noexcept override { discard_operation(this, complete_); }
+    void discard() noexcept override { detail::discard_operation(this, complete_); }
     [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
@@ -39,7 +39,7 @@ class awaited_operation final : public pending {
         if (code && target_.diagnostics != nullptr) {
             *target_.diagnostics = message;
         }
-        end_operation(this, complete_, code, message);
+        detail::end_operation(this, complete_, code, message);
     }
 
     completion<true, Handler> complete_;
@@ -49,8 +49,9 @@ class awaited_operation final : public pending {
 template <class Handler>
 void awaited_request::start(Handler handler) {
     auto slot = boost::asio::get_associated_cancellation_slot(handler);
-    auto* operation = make_operation<awaited_operation<Handler>>(std::move(handler), from.get_executor(), target);
-    from.start(about_to_start(operation, slot), request, options);
+    auto* operation =
+        detail::make_operation<awaited_operation<Handler>>(std::move(handler), from.get_executor(), target);
+    from.start(detail::about_to_start(operation, slot), request, options);
 }
 
 } // namespace cles::detail

@@ -95,13 +95,13 @@ class handler_call final : public remote_call {
     void call() override {
         auto handler = std::move(handler_);
         auto arguments = std::move(arguments_);
-        free_operation(this, handler);
-        release_slot(handler);
+        detail::free_operation(this, handler);
+        detail::release_slot(handler);
         std::apply([&handler](A&... a) { std::move(handler)(std::move(a)...); }, arguments);
     }
     void discard() noexcept override {
         const auto handler = std::move(handler_);
-        free_operation(this, handler);
+        detail::free_operation(this, handler);
     }
 
   private:
@@ -111,8 +111,8 @@ class handler_call final : public remote_call {
 
 template <class Handler, class... A>
 remote_call_ptr make_call(Handler handler, A&&... arguments) {
-    return remote_call_ptr{
-        make_operation<handler_call<Handler, std::decay_t<A>...>>(std::move(handler), std::forward<A>(arguments)...)};
+    return remote_call_ptr{detail::make_operation<handler_call<Handler, std::decay_t<A>...>>(
+        std::move(handler), std::forward<A>(arguments)...)};
 }
 
 /// Calls a handler on its executor; inline if that is the service's executor.
@@ -138,10 +138,10 @@ class completion {
     template <class... A>
     void run(A&&... arguments) && {
         if (executor_.is_service()) {
-            release_slot(handler_);
+            detail::release_slot(handler_);
             std::move(handler_)(std::forward<A>(arguments)...);
         } else {
-            std::move(executor_).dispatch(make_call(std::move(handler_), std::forward<A>(arguments)...));
+            std::move(executor_).dispatch(detail::make_call(std::move(handler_), std::forward<A>(arguments)...));
         }
     }
 
@@ -155,7 +155,7 @@ template <class Operation, class Completion, class... A>
 void end_operation(Operation* self, Completion& kept, boost::system::error_code code, std::string_view message,
                    A&&... values) {
     auto complete = std::move(kept);
-    free_operation(self, complete.handler());
+    detail::free_operation(self, complete.handler());
     std::move(complete)(code, message, std::forward<A>(values)...);
 }
 
@@ -163,7 +163,7 @@ void end_operation(Operation* self, Completion& kept, boost::system::error_code 
 template <class Operation, class Completion>
 void discard_operation(Operation* self, Completion& kept) noexcept {
     const auto complete = std::move(kept);
-    free_operation(self, complete.handler());
+    detail::free_operation(self, complete.handler());
 }
 
 /// Fails an operation that cannot start; the handler is never called inside this call. A handler without an associated
@@ -174,9 +174,9 @@ void fail_later(Handler handler, const boost::asio::any_io_executor& executor, b
     const auto own = executor ? boost::asio::any_io_executor{boost::asio::get_associated_executor(handler, executor)}
                               : boost::asio::any_io_executor{boost::asio::get_associated_executor(handler)};
     if constexpr (Throws) {
-        post_call(own, make_call(std::move(handler), failure_of(code, message), std::forward<T>(values)...));
+        post_call(own, detail::make_call(std::move(handler), failure_of(code, message), std::forward<T>(values)...));
     } else {
-        post_call(own, make_call(std::move(handler), code, std::forward<T>(values)...));
+        post_call(own, detail::make_call(std::move(handler), code, std::forward<T>(values)...));
     }
 }
 

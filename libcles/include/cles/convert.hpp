@@ -10,6 +10,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
@@ -21,7 +22,8 @@
 ///
 /// Supported types:
 ///
-/// - `bool`, integers, floating-point numbers, strings, and enums described with `BOOST_DESCRIBE_ENUM`, by name;
+/// - `bool`, integers of up to 64 bits, floating-point numbers, strings, and enums described with
+///   `BOOST_DESCRIBE_ENUM`, by name;
 /// - `std::vector`, `std::array`, `std::tuple` and `std::pair` as arrays;
 /// - structs described with `BOOST_DESCRIBE_STRUCT` (including described bases), and `std::map` and
 ///   `std::unordered_map` with keys of type `std::string`, as objects;
@@ -36,7 +38,14 @@
 /// member that is missing or has the wrong type is an error that names the path to it, as in "route[2].lat: expected a
 /// number, got a string".
 ///
-/// Text to be written must be UTF-8. Otherwise `to_json` throws, and nothing is sent.
+/// What readers refuse is not written: text that is not UTF-8, brackets nested deeper than 35 levels, a number or time
+/// that has no JSON form. Then `to_json` throws, and nothing is sent.
+///
+/// A `const char*` that is null is written as null. An array of `char` is text that ends at its first zero, or with the
+/// array.
+///
+/// The functions of this header are not customisation points: `cles::converter` is. Functions `to_json`, `write_json`
+/// and the like in the namespace of a type are not called.
 
 namespace cles {
 namespace detail {
@@ -107,18 +116,20 @@ bool read_json(json_reader& r, T& value) {
 
 namespace detail {
 
-[[noreturn, gnu::cold]] void throw_broken_text(const json_writer& w);
+/// Throws unless the text of this writer, which is not certain to be JSON, is.
+[[gnu::cold]] void check_written(const json_writer& w);
 
-/// \throws cles::error with `conversion` if text that is not UTF-8 was written
-inline void require_utf8(const json_writer& w) {
-    if (w.broken_text() != json_writer::npos) {
-        throw_broken_text(w);
+/// Everything that is sent passes this: what a receiver would drop fails here, at its cause.
+/// \throws cles::error with `conversion` if text that is not UTF-8 was written, or something that is not JSON
+inline void require_readable(const json_writer& w) {
+    if (!w.is_certain()) {
+        detail::check_written(w);
     }
 }
 
 } // namespace detail
 
-/// \throws cles::error with `conversion` if text is not UTF-8, or a value has no JSON form
+/// \throws cles::error with `conversion` if text is not UTF-8, or a value has no JSON form that readers accept
 template <class T>
 std::string to_json(const T& value) {
     std::string out;
@@ -127,8 +138,8 @@ std::string to_json(const T& value) {
         out.reserve(usual);
     }
     json_writer writer{out};
-    write_json(writer, value);
-    detail::require_utf8(writer);
+    cles::write_json(writer, value);
+    detail::require_readable(writer);
     return out;
 }
 
@@ -136,7 +147,7 @@ std::string to_json(const T& value) {
 template <class T>
 bool from_json(std::string_view text, T& value, std::string* why = nullptr) {
     json_reader reader{text};
-    if (read_json(reader, value) && reader.at_end()) {
+    if (cles::read_json(reader, value) && reader.at_end()) {
         return true;
     }
     if (why != nullptr) {
@@ -150,7 +161,7 @@ template <class T>
 T from_json(std::string_view text) {
     T value{};
     std::string why;
-    if (!from_json(text, value, &why)) {
+    if (!cles::from_json(text, value, &why)) {
         throw error(errc::conversion, why);
     }
     return value;
@@ -158,7 +169,19 @@ T from_json(std::string_view text) {
 
 namespace detail {
 
-/// \throws cles::error with `conversion` if the text is not JSON
+/// Writes text that ends at the first zero, or after `size` characters.
+void write_array(json_writer& w, const char* text, std::size_t size);
+
+/// \throws cles::error with `conversion`, which says what is out of range, if only the original number was finite
+double require_finite(double number, bool was_finite, std::string_view why);
+
+/// As `std::isfinite`, whose header would slow down every user's compilation.
+template <std::floating_point T>
+constexpr bool is_finite(T value) noexcept {
+    return value - value == 0;
+}
+
+/// \throws cles::error with `conversion` if the text is not JSON, or nested too deep
 void write_text(json_writer& w, std::string_view json);
 
 } // namespace detail
@@ -169,8 +192,9 @@ struct converter<bool> {
     static bool read(json_reader& r, bool& value) { return r.read(value); }
 };
 
+/// Wider integers, such as `__int128`, do not convert: no other program could read their numbers.
 template <class T>
-    requires(std::integral<T> && !std::same_as<T, bool>)
+    requires(std::integral<T> && !std::same_as<T, bool> && sizeof(T) <= sizeof(std::int64_t))
 struct converter<T> {
     using wide = std::conditional_t<std::is_signed_v<T>, std::int64_t, std::uint64_t>;
     static void write(json_writer& w, T value) { w.value(static_cast<wide>(value)); }
@@ -189,13 +213,18 @@ struct converter<T> {
 
 template <std::floating_point T>
 struct converter<T> {
-    static void write(json_writer& w, T value) { w.value(static_cast<double>(value)); }
+    static void write(json_writer& w, T value) {
+        const auto number = static_cast<double>(value);
+        w.value(sizeof(T) > sizeof(double)
+                    ? detail::require_finite(number, detail::is_finite(value), "a number out of the range of a double")
+                    : number);
+    }
     static bool read(json_reader& r, T& value) {
         if (r.peek() == json_reader::kind::null) { // how numbers that are not finite are written
             value = std::numeric_limits<T>::quiet_NaN();
             return r.read_null();
         }
-        double number = 0;
+        std::conditional_t<(sizeof(T) < sizeof(double)), float, double> number = 0;
         if (!r.read(number)) {
             return false;
         }
@@ -215,14 +244,16 @@ struct converter<std::string_view> {
     static void write(json_writer& w, std::string_view value) { w.value(value); }
 };
 
+/// Text that ends at the first zero, or with the array.
 template <std::size_t N>
 struct converter<char[N]> {
-    static void write(json_writer& w, const char* value) { w.value(std::string_view{value}); }
+    static void write(json_writer& w, const char (&value)[N]) { detail::write_array(w, value, N); }
 };
 
+/// A null pointer is null.
 template <>
 struct converter<const char*> {
-    static void write(json_writer& w, const char* value) { w.value(std::string_view{value}); }
+    static void write(json_writer& w, const char* value);
 };
 
 template <>
@@ -242,7 +273,7 @@ template <class T>
 struct converter<std::optional<T>> {
     static void write(json_writer& w, const std::optional<T>& value) {
         if (value) {
-            write_json(w, *value);
+            cles::write_json(w, *value);
         } else {
             w.null();
         }
@@ -252,7 +283,7 @@ struct converter<std::optional<T>> {
             value.reset();
             return r.read_null();
         }
-        return read_json(r, value.emplace());
+        return cles::read_json(r, value.emplace());
     }
 };
 

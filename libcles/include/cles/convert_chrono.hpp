@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <ratio>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -35,6 +36,8 @@ bool read_duration(json_reader& r, double& seconds);
 void write_time_point(json_writer& w, whole_time since_1970);
 bool read_time_point(json_reader& r, whole_time& since_1970);
 
+inline constexpr std::string_view time_out_of_range = "a time out of range";
+
 /// Converts a time to units of num/den seconds, rounded down. False if `count` would overflow.
 bool count_units(whole_time value, std::int64_t num, std::int64_t den, std::int64_t& count) noexcept;
 [[noreturn]] void throw_time_out_of_range();
@@ -43,27 +46,40 @@ whole_time whole_of(std::int64_t count, std::int64_t num, std::int64_t den);
 whole_time whole_of(double seconds);
 double seconds_of(whole_time value) noexcept;
 
+/// The number of seconds of a floating-point duration. Throws if it is finite and overflows.
+template <class Rep, class Period>
+double seconds_of(const std::chrono::duration<Rep, Period>& value) {
+    return require_finite(std::chrono::duration<double>(value).count(), detail::is_finite(value.count()),
+                          time_out_of_range);
+}
+
 template <class Rep, class Period>
 whole_time whole_of(const std::chrono::duration<Rep, Period>& value) {
     if constexpr (std::is_floating_point_v<Rep>) {
-        return whole_of(std::chrono::duration<double>(value).count());
+        return detail::whole_of(detail::seconds_of(value));
     } else {
         if (!std::in_range<std::int64_t>(value.count())) {
             throw_time_out_of_range();
         }
-        return whole_of(static_cast<std::int64_t>(value.count()), Period::num, Period::den);
+        return detail::whole_of(static_cast<std::int64_t>(value.count()), Period::num, Period::den);
     }
+}
+
+template <class Rep, class Period>
+bool from_seconds(json_reader& r, double seconds, std::chrono::duration<Rep, Period>& value) {
+    const std::chrono::duration<std::common_type_t<Rep, double>, Period> units{std::chrono::duration<double>(seconds)};
+    value = std::chrono::duration<Rep, Period>(static_cast<Rep>(units.count()));
+    return detail::is_finite(value.count()) || !detail::is_finite(seconds) || r.fail(time_out_of_range);
 }
 
 template <class Rep, class Period>
 bool from_whole(json_reader& r, whole_time from, std::chrono::duration<Rep, Period>& value) {
     if constexpr (std::is_floating_point_v<Rep>) {
-        value = std::chrono::duration<Rep, Period>(std::chrono::duration<double>(seconds_of(from)));
-        return true;
+        return detail::from_seconds(r, detail::seconds_of(from), value);
     } else {
         std::int64_t count = 0;
         if (!count_units(from, Period::num, Period::den, count) || !std::in_range<Rep>(count)) {
-            return r.fail("a time out of range");
+            return r.fail(time_out_of_range);
         }
         value = std::chrono::duration<Rep, Period>(static_cast<Rep>(count));
         return true;
@@ -79,7 +95,7 @@ struct converter<std::chrono::duration<Rep, Period>> {
 
     static void write(json_writer& w, const duration& value) {
         if constexpr (std::is_floating_point_v<Rep>) {
-            detail::write_duration(w, std::chrono::duration<double>(value).count());
+            detail::write_duration(w, detail::seconds_of(value));
         } else {
             detail::write_duration(w, detail::whole_of(value));
         }
@@ -87,11 +103,7 @@ struct converter<std::chrono::duration<Rep, Period>> {
     static bool read(json_reader& r, duration& value) {
         if constexpr (std::is_floating_point_v<Rep>) {
             double seconds = 0;
-            if (!detail::read_duration(r, seconds)) {
-                return false;
-            }
-            value = duration(std::chrono::duration<double>(seconds));
-            return true;
+            return detail::read_duration(r, seconds) && detail::from_seconds(r, seconds, value);
         } else {
             detail::whole_time whole;
             return detail::read_duration(r, whole) && detail::from_whole(r, whole, value);

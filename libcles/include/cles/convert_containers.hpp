@@ -26,7 +26,7 @@ bool read_elements(json_reader& r, Sequence& out) {
         return false;
     }
     while (r.next_element()) {
-        if (!read_json(r, out.emplace_back())) {
+        if (!cles::read_json(r, out.emplace_back())) {
             r.inside_element(out.size() - 1);
             return false;
         }
@@ -37,9 +37,9 @@ bool read_elements(json_reader& r, Sequence& out) {
 template <class Map>
 void write_members(json_writer& w, const Map& values) {
     w.begin_object();
-    for (const auto& [name, value] : values) {
-        w.key(name);
-        write_json(w, value);
+    for (const auto& member : values) { // a structured binding would call `get` of the namespace of the values
+        w.key(member.first);
+        cles::write_json(w, member.second);
     }
     w.end_object();
 }
@@ -53,7 +53,7 @@ bool read_members(json_reader& r, Map& values) {
     std::string_view key;
     while (r.next_key(key)) {
         const auto at = values.try_emplace(std::string{key}).first;
-        if (!read_json(r, at->second)) {
+        if (!cles::read_json(r, at->second)) {
             r.inside_member(at->first);
             return false;
         }
@@ -68,7 +68,7 @@ template <class Tuple>
 struct fixed_elements {
     static void write(json_writer& w, const Tuple& values) {
         w.begin_array();
-        std::apply([&w](const auto&... value) { (write_json(w, value), ...); }, values);
+        std::apply([&w](const auto&... value) { (cles::write_json(w, value), ...); }, values);
         w.end_array();
     }
     static bool read(json_reader& r, Tuple& values) {
@@ -78,7 +78,7 @@ struct fixed_elements {
             if (!r.next_element()) {
                 return r.ok() && fail_count(r, "fewer", count);
             }
-            if (!read_json(r, value)) {
+            if (!cles::read_json(r, value)) {
                 r.inside_element(next);
                 return false;
             }
@@ -97,7 +97,7 @@ struct converter<std::vector<T, A>> {
     static void write(json_writer& w, const std::vector<T, A>& values) {
         w.begin_array();
         for (const auto& value : values) {
-            write_json<T>(w, value);
+            cles::write_json<T>(w, value);
         }
         w.end_array();
     }
@@ -135,7 +135,7 @@ struct converter<std::array<T, N>> {
     static void write(json_writer& w, const std::array<T, N>& values) {
         w.begin_array();
         for (const auto& value : values) {
-            write_json(w, value);
+            cles::write_json(w, value);
         }
         w.end_array();
     }
@@ -148,7 +148,7 @@ struct converter<std::array<T, N>> {
             if (count == N) {
                 return detail::fail_count(r, "more", N);
             }
-            if (!read_json(r, values[count])) {
+            if (!cles::read_json(r, values[count])) {
                 r.inside_element(count);
                 return false;
             }

@@ -10,6 +10,7 @@
 
 #include <array>
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -64,8 +65,8 @@ constexpr bool any_is_named(List<D...>, [[maybe_unused]] std::string_view name) 
 /// Whether a class describes a member of this name, which then hides those of its bases.
 template <class T>
 constexpr bool has_member_named(std::string_view name) noexcept {
-    return any_is_named(public_members_of<T>{}, name) || any_is_named(protected_members_of<T>{}, name) ||
-           any_is_named(private_members_of<T>{}, name);
+    return detail::any_is_named(public_members_of<T>{}, name) ||
+           detail::any_is_named(protected_members_of<T>{}, name) || detail::any_is_named(private_members_of<T>{}, name);
 }
 
 // Found: the fields so far. Hiding: the derived classes, whose members hide those of their bases.
@@ -76,7 +77,7 @@ struct add_fields {
 template <class... F, template <class...> class List, class D, class... More, class... Hiding>
 struct add_fields<descriptors<F...>, List<D, More...>, Hiding...>
     : add_fields<std::conditional_t<is_field<D> && !(std::is_same_v<F, D> || ...) &&
-                                        !(has_member_named<Hiding>(D::name) || ...),
+                                        !(detail::has_member_named<Hiding>(D::name) || ...),
                                     descriptors<F..., D>, descriptors<F...>>,
                  List<More...>, Hiding...> {};
 
@@ -150,9 +151,10 @@ constexpr bool has_default(std::string_view member) noexcept {
 template <class T, class D>
 constexpr field field_for() {
     using value = std::remove_cvref_t<decltype(std::declval<T&>().*D::pointer)>;
-    using owner = decltype(class_of(D::pointer));
-    return {D::name, [](json_reader& r, void* object) { return read_json(r, static_cast<T*>(object)->*D::pointer); },
-            !is_optional<value> && !has_default<owner>(D::name) && !has_default<T>(D::name)};
+    using owner = decltype(detail::class_of(D::pointer));
+    return {D::name,
+            [](json_reader& r, void* object) { return cles::read_json(r, static_cast<T*>(object)->*D::pointer); },
+            !is_optional<value> && !detail::has_default<owner>(D::name) && !detail::has_default<T>(D::name)};
 }
 
 template <class T, class... D>
@@ -196,17 +198,17 @@ void write_field(json_writer& w, const T& object) {
     if constexpr (is_optional<std::remove_cvref_t<decltype(value)>>) {
         if (value) {
             w.plain_key(key_of<D>);
-            write_json(w, *value);
+            cles::write_json(w, *value);
         }
     } else {
         w.plain_key(key_of<D>);
-        write_json(w, value);
+        cles::write_json(w, value);
     }
 }
 
 template <class T, class... D>
 void write_fields(json_writer& w, const T& object, descriptors<D...>) {
-    (write_field<D>(w, object), ...);
+    (detail::write_field<D>(w, object), ...);
 }
 
 // --- Enums ---
@@ -233,14 +235,15 @@ bool read_choice(json_reader& r, std::span<const std::string_view> names, std::s
 template <detail::described_enum T>
 struct converter<T> {
     static void write(json_writer& w, T value) {
+        using number = std::underlying_type_t<T>; // the type may have a comparison of its own
         constexpr auto& known = detail::enumerators<T>;
         for (auto i = known.count; i-- > 0;) {
-            if (known.values[i] == value) {
+            if (static_cast<number>(known.values[i]) == static_cast<number>(value)) {
                 w.value(known.names[i]);
                 return;
             }
         }
-        write_json(w, static_cast<std::underlying_type_t<T>>(value));
+        cles::write_json(w, static_cast<number>(value));
     }
     static bool read(json_reader& r, T& value) {
         std::size_t index = 0;
@@ -262,7 +265,7 @@ struct converter<T> {
     static bool read(json_reader& r, T& object) {
         static_assert(detail::defaults_are_fields<T>(),
                       "CLES_DEFAULTS names a member that BOOST_DESCRIBE_STRUCT does not");
-        return detail::read_fields(r, &object, detail::field_table<T>);
+        return detail::read_fields(r, std::addressof(object), detail::field_table<T>);
     }
 };
 

@@ -27,7 +27,7 @@ struct converter<std::variant<T...>> {
     using variant = std::variant<T...>;
 
     static void write(json_writer& w, const variant& value) {
-        std::visit([&w](const auto& held) { write_json(w, held); }, value);
+        std::visit([&w](const auto& held) { cles::write_json(w, held); }, value);
     }
     static bool read(json_reader& r, variant& value) {
         std::string_view raw;
@@ -46,7 +46,7 @@ struct converter<std::variant<T...>> {
     template <std::size_t I>
     static bool try_one(std::string_view raw, variant& value, std::string& why) {
         json_reader part{raw, std::string_view::npos}; // its depth has been checked
-        if (read_json(part, value.template emplace<I>())) {
+        if (cles::read_json(part, value.template emplace<I>())) {
             return true;
         }
         const auto wrong = part.error();

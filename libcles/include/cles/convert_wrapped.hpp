@@ -62,7 +62,7 @@ struct converter<detail::wrapped<T>> {
                 if (!r.skip()) {
                     return false;
                 }
-            } else if (read_json(r, out.value)) {
+            } else if (cles::read_json(r, out.value)) {
                 found = true;
             } else {
                 r.inside_member("value");
@@ -89,13 +89,13 @@ struct converter<detail::wrapped<T>> {
         if (scalar.peek() == json_reader::kind::object && scalar.begin_object()) {
             std::string_view key;
             if (scalar.next_key(key) && key == "value" && scalar.peek() != json_reader::kind::object &&
-                scalar.peek() != json_reader::kind::array && read_json(scalar, out.value) && !scalar.next_key(key) &&
-                scalar.ok()) {
+                scalar.peek() != json_reader::kind::array && cles::read_json(scalar, out.value) &&
+                !scalar.next_key(key) && scalar.ok()) {
                 return true;
             }
         }
         json_reader plain{raw, std::string_view::npos};
-        return read_json(plain, out.value) || r.fail_as(plain);
+        return cles::read_json(plain, out.value) || r.fail_as(plain);
     }
 };
 } // namespace cles
@@ -106,13 +106,13 @@ namespace cles::detail {
 template <class T>
 std::string to_body(const T& value) {
     if constexpr (!is_scalar<T> && !comes_wrapped<T> && !std::is_convertible_v<const T&, std::string_view>) {
-        return to_json(value);
+        return cles::to_json(value);
     } else {
         constexpr std::string_view head = "{\"value\":";
         std::string out{head};
         json_writer writer{out};
-        write_json(writer, value);
-        require_utf8(writer);
+        cles::write_json(writer, value);
+        require_readable(writer);
         if (out[head.size()] == '{' || out[head.size()] == '[') {
             return out.substr(head.size());
         }

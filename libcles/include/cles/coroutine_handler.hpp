@@ -40,10 +40,10 @@ struct coroutine_handler {
             if constexpr (shape::takes_responder) {
                 co_await (*f)(r, answer);
             } else if constexpr (std::is_void_v<typename awaited<typename shape::result>::type>) {
-                co_await invoke_handler(*f, r);
+                co_await detail::invoke_handler(*f, r);
                 answer.done();
             } else {
-                const auto value = co_await invoke_handler(*f, r);
+                const auto value = co_await detail::invoke_handler(*f, r);
                 answer.done(value);
             }
         } catch (...) {

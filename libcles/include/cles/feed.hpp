@@ -78,11 +78,11 @@ bool read_body(const raw_event& event, T& value, boost::system::error_code& code
         return event.has_json();
     } else if constexpr (comes_wrapped<T>) {
         wrapped<T> carrier{};
-        const auto verdict = read_result(event.body, carrier, code, why, what);
+        const auto verdict = detail::read_result(event.body, carrier, code, why, what);
         value = std::move(carrier.value);
         return verdict == pending::verdict::completed;
     } else {
-        return read_result(event.body, value, code, why, what) == pending::verdict::completed;
+        return detail::read_result(event.body, value, code, why, what) == pending::verdict::completed;
     }
 }
 
@@ -95,14 +95,14 @@ bool read_shared_body(const raw_event& event, T& value, boost::system::error_cod
                 value = *known;
                 return true;
             }
-            const bool is_json = read_body(event, value, code, why);
+            const bool is_json = detail::read_body(event, value, code, why);
             if (is_json && !code) {
                 event.reading->put(value);
             }
             return is_json;
         }
     }
-    return read_body(event, value, code, why);
+    return detail::read_body(event, value, code, why);
 }
 
 /// Fills the item from an event. False if its body is not JSON.
@@ -113,7 +113,7 @@ bool fill(const raw_event& event, feed_item<T>& item, boost::system::error_code&
     item.seq = event.seq;
     item.missed = event.missed;
     item.text = event.text;
-    return !item.has_value() || read_shared_body(event, item.value, code, why);
+    return !item.has_value() || detail::read_shared_body(event, item.value, code, why);
 }
 
 template <class T, bool Throws, class Handler>
@@ -126,18 +126,18 @@ class event_operation final : public pending_event {
         feed_item<T> item;
         std::string why;
         boost::system::error_code code;
-        if (!fill(event, item, code, why)) {
+        if (!detail::fill(event, item, code, why)) {
             return false;
         }
-        end_operation(this, complete_, code, why, std::move(item));
+        detail::end_operation(this, complete_, code, why, std::move(item));
         return true;
     }
 
     void fail(boost::system::error_code code, std::string_view message) override {
-        end_operation(this, complete_, code, std::string{message}, feed_item<T>{});
+        detail::end_operation(this, complete_, code, std::string{message}, feed_item<T>{});
     }
 
-    void discard() noexcept override { discard_operation(this, complete_); }
+    void discard() noexcept override { detail::discard_operation(this, complete_); }
     [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
@@ -154,7 +154,7 @@ struct event_target {
 /// last one in part.
 template <class T>
 bool read_event(const raw_event& event, void* value, boost::system::error_code& code, std::string& why) {
-    return fill(event, static_cast<std::optional<feed_item<T>>*>(value)->emplace(), code, why);
+    return detail::fill(event, static_cast<std::optional<feed_item<T>>*>(value)->emplace(), code, why);
 }
 
 /// What an `async_next` needs of its feed, which may be moved or closed before the operation starts.
@@ -172,9 +172,10 @@ template <class Operation, class Handler, class... A>
 void start_next(const next_source& from, Handler handler, const A&... arguments) {
     const auto& control = from.control;
     const auto slot = boost::asio::get_associated_cancellation_slot(handler);
-    auto* operation = make_operation<Operation>(std::move(handler), control->executor(), arguments...);
+    auto* operation = detail::make_operation<Operation>(std::move(handler), control->executor(), arguments...);
     const bool hop = from.elsewhere || operation->elsewhere();
-    connect_slot(slot, next_withdrawal{control, operation, hop ? control->executor() : boost::asio::any_io_executor{}});
+    detail::connect_slot(
+        slot, next_withdrawal{control, operation, hop ? control->executor() : boost::asio::any_io_executor{}});
     begin_next(control, event_ptr{operation}, hop);
 }
 
@@ -202,7 +203,7 @@ struct next_coroutine {
 template <class T>
 boost::asio::awaitable<feed_item<T>> next_coroutine<T>::run(next_source from) {
     std::optional<feed_item<T>> item;
-    awaited_next next{from, {&item, read_event<T>}};
+    awaited_next next{from, {std::addressof(item), read_event<T>}};
     co_await std::move(next); // NOLINT(performance-move-const-arg): Asio awaits rvalues
     co_return *std::move(item);
 }
@@ -260,7 +261,7 @@ class bind_operation final : public binding {
 
     verdict offer(std::string_view) override {
         feed<T> bound{feed_owner{take_control(), complete_.elsewhere()}};
-        end_operation(this, complete_, {}, {}, std::move(bound));
+        detail::end_operation(this, complete_, {}, {}, std::move(bound));
         return verdict::completed;
     }
 
@@ -269,10 +270,10 @@ class bind_operation final : public binding {
         if (diagnostics_ != nullptr) {
             *diagnostics_ = text;
         }
-        end_operation(this, complete_, code, text, feed<T>{});
+        detail::end_operation(this, complete_, code, text, feed<T>{});
     }
 
-    void discard() noexcept override { discard_operation(this, complete_); }
+    void discard() noexcept override { detail::discard_operation(this, complete_); }
     [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:

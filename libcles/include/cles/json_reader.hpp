@@ -13,7 +13,7 @@ namespace cles {
 /// Reads JSON (RFC 8259, strictly) value by value from borrowed text, without building a tree.
 ///
 /// Functions return whether they succeeded. After the first failure, all others fail too, and `error` says what was
-/// expected and where. Doubles are read exactly (`std::from_chars`). The text must outlive the reader; a key or string
+/// expected and where. Numbers are read exactly (`std::from_chars`). The text must outlive the reader; a key or string
 /// view that a function returns is valid until the next call. Not thread-safe.
 class json_reader {
   public:
@@ -39,6 +39,7 @@ class json_reader {
     bool read_null();
     bool read(bool& out);
     bool read(double& out);
+    bool read(float& out);
     bool read(std::int64_t& out);
     bool read(std::uint64_t& out);
     bool read(std::string& out);

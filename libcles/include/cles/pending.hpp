@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
+#include <cles/json_writer.hpp>
 #include <cles/update_mark.hpp>
 
 #include <cstddef>
@@ -14,8 +15,8 @@
 
 namespace cles::detail {
 
-/// The maximum depth of brackets in a reply: the default depth of a body, and what may be wrapped around it.
-inline constexpr std::size_t answer_depth = 32 + 3;
+/// The maximum depth of brackets in a reply.
+inline constexpr std::size_t answer_depth = json_writer::most_levels;
 inline bool is_valid_answer(std::string_view json) { return is_valid_json(json, answer_depth); }
 
 /// A pending operation. Its owner ends it once, with `offer`, `fail` or `discard`, which destroy it.

@@ -86,7 +86,7 @@ class plugin_entry {
             use();
         } else {
             using settings = std::remove_cvref_t<std::tuple_element_t<1, arguments>>;
-            use(plugin_config<settings>(view_of(config)));
+            use(detail::plugin_config<settings>(view_of(config)));
         }
     }
 

@@ -47,11 +47,11 @@ template <class C>
 C plugin_config(std::string_view json) {
     C config{};
     std::string why;
-    if (!from_json(json, config, &why)) {
+    if (!cles::from_json(json, config, &why)) {
         throw setting_error(setting_named_in(why), "its configuration is invalid: " + why);
     }
     if constexpr (described_struct<C>) {
-        if (const auto unknown = unknown_setting<C>(json); !unknown.empty()) {
+        if (const auto unknown = detail::unknown_setting<C>(json); !unknown.empty()) {
             throw setting_error(unknown, "it has no setting '" + unknown + "'");
         }
     }

@@ -25,7 +25,7 @@ class plugin_task {
         : host_(host), handler_(std::make_shared<registration>(std::move(task))) {}
 
     static void start(void* user, cles_job job, const cles_request* request) {
-        static_cast<plugin_task*>(user)->run(job, known_part(request));
+        static_cast<plugin_task*>(user)->run(job, detail::known_part(request));
     }
     void stop() noexcept {
         std::shared_ptr<registration> last; // destroyed without the lock: the handler may wait for threads
@@ -82,7 +82,7 @@ class plugin_task {
         if (task.plain) {
             std::string result;
             json_writer writer{result};
-            task.plain(what, writer);
+            run_plain(task.plain, what, writer);
             host_.done(&host_, job, abi_text(result));
         } else {
             const auto control = std::make_shared<plugin_call>(host_, job);

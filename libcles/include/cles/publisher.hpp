@@ -36,7 +36,7 @@ class publisher {
     /// \throws cles::error with `conversion` if it cannot be written as JSON, for example text that is not UTF-8
     template <class T>
     void update(std::string_view noun, const T& value) const {
-        to_->publish(noun, to_json(value));
+        to_->publish(noun, cles::to_json(value));
     }
 
   private:

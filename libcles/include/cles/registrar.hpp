@@ -22,6 +22,17 @@ using plain_handler = std::function<void(const request&, json_writer&)>;
 /// A handler that replies later.
 using async_handler = std::function<void(const request&, responder)>;
 
+namespace detail {
+
+/// Calls a plain handler.
+/// \throws what it throws, and cles::error with `conversion` if nobody could read its result
+inline void run_plain(const plain_handler& handler, const request& r, json_writer& w) {
+    handler(r, w);
+    require_readable(w);
+}
+
+} // namespace detail
+
 /// A task and its handler. At most one of the two handlers is set; none for a task that is only bound.
 struct registration {
     cles::verb verb = verb::pull;
@@ -85,13 +96,13 @@ void set_handler(handler_functions& to, F f) {
             to.async = coroutine_handler<F>{std::make_shared<F>(std::move(f))};
         }
     } else if constexpr (shape::takes_responder) {
-        to.async = copyable(std::move(f));
+        to.async = detail::copyable(std::move(f));
     } else if constexpr (std::is_void_v<typename shape::result>) {
-        to.plain = copyable([f = std::move(f)](const request& r, json_writer&) mutable { invoke_handler(f, r); });
+        to.plain = detail::copyable(
+            [f = std::move(f)](const request& r, json_writer&) mutable { detail::invoke_handler(f, r); });
     } else {
-        to.plain = copyable([f = std::move(f)](const request& r, json_writer& w) mutable {
-            write_json(w, invoke_handler(f, r));
-            require_utf8(w);
+        to.plain = detail::copyable([f = std::move(f)](const request& r, json_writer& w) mutable {
+            cles::write_json(w, detail::invoke_handler(f, r));
         });
     }
 }

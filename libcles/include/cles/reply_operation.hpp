@@ -32,7 +32,7 @@ pending::verdict read_result(std::string_view json, T& value, boost::system::err
                              std::string_view what = "the answer") {
     json_reader reader{json, answer_depth};
     try {
-        if (read_json(reader, value) && reader.at_end()) {
+        if (cles::read_json(reader, value) && reader.at_end()) {
             return pending::verdict::completed;
         }
     } catch (const std::exception& thrown) {
@@ -62,7 +62,7 @@ class reply_operation final : public pending {
             finish(code, why);
         } else {
             reply_carrier<T> value{};
-            if (read_result(json, value, code, why) == verdict::malformed) {
+            if (detail::read_result(json, value, code, why) == verdict::malformed) {
                 return verdict::malformed;
             }
             if constexpr (comes_wrapped<T>) {
@@ -83,7 +83,7 @@ class reply_operation final : public pending {
         }
     }
 
-    void discard() noexcept override { discard_operation(this, complete_); }
+    void discard() noexcept override { detail::discard_operation(this, complete_); }
     [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
@@ -92,7 +92,7 @@ class reply_operation final : public pending {
         if (code && diagnostics_ != nullptr) {
             *diagnostics_ = message;
         }
-        end_operation(this, complete_, code, message, std::forward<V>(value)...);
+        detail::end_operation(this, complete_, code, message, std::forward<V>(value)...);
     }
 
     completion<Throws, Handler> complete_;
@@ -109,7 +109,7 @@ struct reply_target {
 /// Reads an awaited result into a `reply_carrier<T>`.
 template <class T>
 pending::verdict read_reply(std::string_view json, void* value, boost::system::error_code& code, std::string& why) {
-    return read_result(json, *static_cast<reply_carrier<T>*>(value), code, why);
+    return detail::read_result(json, *static_cast<reply_carrier<T>*>(value), code, why);
 }
 
 } // namespace cles::detail

@@ -104,7 +104,7 @@ class request {
         using carrier = std::conditional_t<detail::comes_wrapped<T>, detail::wrapped<T>, T>;
         carrier value{};
         std::string why;
-        if (!from_json(body(), value, &why)) {
+        if (!cles::from_json(body(), value, &why)) {
             detail::throw_bad_body(why);
         }
         if constexpr (detail::comes_wrapped<T>) {

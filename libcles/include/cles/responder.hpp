@@ -70,13 +70,13 @@ class responder {
   public:
     explicit responder(std::shared_ptr<detail::call_control> call) noexcept : call_(std::move(call)) {}
 
-    /// Replies with a result: a described struct, a scalar, `json_text`, or nothing. If it cannot be written as JSON,
-    /// for example text that is not UTF-8, the reply is `failed`.
+    /// Replies with a result: a described struct, a scalar, `json_text`, or nothing. If it cannot be written as JSON
+    /// that requesters read, for example text that is not UTF-8, the reply is `failed`.
     template <class T>
     void done(const T& result) const {
         std::string json;
         try {
-            json = to_json(result);
+            json = cles::to_json(result);
         } catch (...) {
             detail::fail_with(*call_, std::current_exception());
             return;
@@ -94,7 +94,7 @@ class responder {
     bool progress(double fraction) const { return call_->progress(fraction, "{}"); }
     template <class T>
     bool progress(double fraction, const T& details) const {
-        return call_->progress(fraction, to_json(details));
+        return call_->progress(fraction, cles::to_json(details));
     }
 
     /// Called once when the requester cancels, its link is lost or the deadline passes; at once if that has already

@@ -182,7 +182,7 @@ class slot_ref {
   private:
     template <class Slot>
     static void assign_slot(void* slot, withdrawal withdraw) {
-        connect_slot(*static_cast<Slot*>(slot), std::move(withdraw));
+        detail::connect_slot(*static_cast<Slot*>(slot), std::move(withdraw));
     }
 
     void* slot_;
@@ -234,7 +234,8 @@ boost::asio::awaitable<T> reply_coroutine<T, Options>::run(service& from, reques
                                                            outgoing_body body, Options options) {
     reply_carrier<T> value{};
     const call_options& chosen = options;
-    awaited_request request{from, {kind, noun.view(), body}, chosen, {&value, read_reply<T>, chosen.diagnostics_}};
+    awaited_request request{
+        from, {kind, noun.view(), body}, chosen, {std::addressof(value), read_reply<T>, chosen.diagnostics_}};
     co_await std::move(request); // NOLINT(performance-move-const-arg): Asio awaits rvalues
     if constexpr (comes_wrapped<T>) {
         co_return std::move(value.value);
@@ -342,10 +343,10 @@ class service : public registrar {
     /// suspends, its reply is written before the updates that it has published.
     /// \throws cles::error: `invalid_name`, `too_large`, `busy` (the maximum number of nouns is bound, or no memory is
     /// left), `failed` (the value begins like a failure, or is being written while another value of the noun is),
-    /// `conversion` (text that is not UTF-8)
+    /// `conversion` (text that is not UTF-8, brackets nested deeper than 35 levels)
     template <class T>
     void update(std::string_view noun, const T& value) {
-        publish(noun, [&](json_writer& w) { write_json(w, value); });
+        publish(noun, [&](json_writer& w) { cles::write_json(w, value); });
     }
 
     /// Forgets the last value of a noun; later subscribers receive `{}`. Existing subscribers stay bound, and still
@@ -363,15 +364,15 @@ class service : public registrar {
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
         if constexpr (detail::is_default_token<Token>) {
-            return await_update(std::string{noun}, converted([&] { return to_json(value); }));
+            return await_update(std::string{noun}, converted([&] { return cles::to_json(value); }));
         } else {
             return initiate_plain(&service::start_update, std::forward<Token>(token), std::string{noun},
-                                  converted([&] { return to_json(value); }));
+                                  converted([&] { return cles::to_json(value); }));
         }
     }
 
     /// Sends any request, as a command of the language: "PULL car0:localization", "PUSH car0:notice {\"text\":\"hi\"}".
-    /// The result is the reply's JSON.
+    /// The result is the reply's JSON. The command's own JSON may have several lines; it is sent as one.
     template <detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_request(std::string_view command, Token&& token = {}) {
         return initiate<json_text>({.is_command = true}, command, {}, std::cref(detail::no_options()),
@@ -484,7 +485,7 @@ class service : public registrar {
     }
 
     template <class T, class Token, class Handler>
-    auto* make_operation(Handler handler, std::string* diagnostics) {
+    auto* new_operation(Handler handler, std::string* diagnostics) {
         using operation_type = detail::reply_operation<T, detail::throws<std::remove_cvref_t<Token>>, Handler>;
         return detail::make_operation<operation_type>(std::move(handler), get_executor(), diagnostics);
     }
@@ -502,7 +503,7 @@ class service : public registrar {
                 [this, kind](auto handler, const detail::short_text& target, const detail::outgoing_body& content,
                              const call_options& chosen) {
                     auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                    auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
+                    auto* operation = new_operation<T, Token>(std::move(handler), chosen.diagnostics_);
                     start(detail::about_to_start(operation, slot), {kind, target.view(), content}, chosen);
                 },
                 token, detail::short_text{noun}, std::move(body), options);
@@ -524,7 +525,7 @@ class service : public registrar {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
             [this, begin](auto handler, const A&... kept) {
                 auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
+                auto* operation = new_operation<void, Token>(std::move(handler), nullptr);
                 (this->*begin)(detail::about_to_start(operation, slot), kept...);
             },
             token, std::move(arguments)...);

@@ -310,7 +310,7 @@ void engine::add(registration offered) {
     if (offered.plain) {
         entry.plain = [this, handler = std::move(offered.plain)](const request& r, json_writer& w) {
             const auto during = flush_scheduler().serving();
-            handler(r, w);
+            run_plain(handler, r, w);
         };
     }
     if (offered.async) {

@@ -4,6 +4,9 @@
 
 #include "json/json_scan.hpp"
 
+#include <cmath>
+#include <type_traits>
+
 namespace cles {
 namespace detail {
 namespace {
@@ -65,7 +68,12 @@ std::shared_ptr<const request_data> own(const request_data& data) {
 
 template <class T>
 bool read_number(std::string_view text, T& number) noexcept {
-    return json_detail::read_number(text, number);
+    const bool is_number = json_detail::read_number(text, number);
+    if constexpr (std::is_floating_point_v<T>) {
+        return is_number && std::isfinite(number); // it reads words such as `inf`, too
+    } else {
+        return is_number;
+    }
 }
 template bool read_number(std::string_view, char&) noexcept;
 template bool read_number(std::string_view, signed char&) noexcept;

@@ -27,14 +27,22 @@ std::string path_to(std::string_view json, std::size_t at) {
         case '{': levels.push_back({.is_object = true}); break;
         case '[': levels.push_back({}); break;
         case '}':
-        case ']': levels.pop_back(); break;
-        case ',': ++levels.back().index; break;
+        case ']':
+            if (!levels.empty()) { // what came through `raw` may be anything
+                levels.pop_back();
+            }
+            break;
+        case ',':
+            if (!levels.empty()) {
+                ++levels.back().index;
+            }
+            break;
         case '"': {
             const auto begin = i + 1;
             while (++i < json.size() && json[i] != '"') {
                 i += json[i] == '\\' ? 1 : 0;
             }
-            if (i < at && i + 1 < json.size() && json[i + 1] == ':') {
+            if (i < at && i + 1 < json.size() && json[i + 1] == ':' && !levels.empty()) {
                 levels.back().key = json.substr(begin, i - begin);
             }
             break;
@@ -55,9 +63,30 @@ std::string path_to(std::string_view json, std::size_t at) {
 
 } // namespace
 
-void throw_broken_text(const json_writer& w) {
-    const auto path = path_to(w.written(), w.broken_text());
-    throw error(errc::conversion, path + (path.empty() ? "" : ": ") + "text that is not UTF-8");
+void check_written(const json_writer& w) {
+    if (w.broken_text() != json_writer::npos) {
+        const auto path = path_to(w.written(), w.broken_text());
+        throw error(errc::conversion, path + (path.empty() ? "" : ": ") + "text that is not UTF-8");
+    }
+    std::string why;
+    if (!is_valid_json(w.written(), w.max_depth(), &why)) {
+        throw error(errc::conversion, "what was written is not JSON: " + why);
+    }
+    if (w.written().find('\n') != std::string_view::npos) { // it would end the line of a message
+        throw error(errc::conversion, "what was written contains a line feed");
+    }
+}
+
+void write_array(json_writer& w, const char* text, std::size_t size) {
+    const std::string_view whole{text, size};
+    w.value(whole.substr(0, whole.find('\0')));
+}
+
+double require_finite(double number, bool was_finite, std::string_view why) {
+    if (was_finite && !is_finite(number)) {
+        throw error(errc::conversion, std::string{why});
+    }
+    return number;
 }
 
 bool fail_count(json_reader& r, std::string_view which, std::size_t wanted) {
@@ -122,12 +151,24 @@ bool read_choice(json_reader& r, std::span<const std::string_view> names, std::s
 
 void write_text(json_writer& w, std::string_view json) {
     std::string why;
-    if (!is_valid_json(json, 32, &why)) {
+    if (!is_valid_json(json, std::min<std::size_t>(w.levels_left(), 32), &why)) {
         throw error(errc::conversion, "the text to send is not JSON: " + why);
     }
     std::string compact;
     append_compact_json(json, compact);
-    w.raw(compact);
+    w.checked(compact);
 }
 
 } // namespace cles::detail
+
+namespace cles {
+
+void converter<const char*>::write(json_writer& w, const char* value) {
+    if (value == nullptr) {
+        w.null();
+    } else {
+        w.value(std::string_view{value});
+    }
+}
+
+} // namespace cles

@@ -35,8 +35,11 @@ bool narrow(wide value, std::int64_t& out) {
 
 bool to_whole(wide nanoseconds, whole_time& value) {
     const auto seconds = floor_divide(nanoseconds, second);
+    if (!narrow(seconds, value.seconds)) {
+        return false;
+    }
     value.nanoseconds = static_cast<std::int64_t>(nanoseconds - seconds * second);
-    return narrow(seconds, value.seconds);
+    return true;
 }
 
 /// Reads a text from its start.
@@ -151,13 +154,18 @@ std::string_view parse_duration(std::string_view text, whole_time& value) {
         if (unit == 0) {
             return duration_expected;
         }
-        total += (minus ? -number : number) * unit;
+        if (__builtin_add_overflow(total, (minus ? -number : number) * unit, &total)) {
+            return time_out_of_range;
+        }
         any = true;
     }
     if (!any) {
         return duration_expected;
     }
-    return to_whole(negative ? -total : total, value) ? std::string_view{} : "a time out of range";
+    if (negative && __builtin_sub_overflow(wide{0}, total, &total)) {
+        return time_out_of_range;
+    }
+    return to_whole(total, value) ? std::string_view{} : time_out_of_range;
 }
 
 bool parse_zone(scanner& from, std::int64_t& ahead) {
@@ -226,12 +234,12 @@ bool read_seconds(json_reader& r, whole_time& value) {
         double seconds = 0;
         json_reader number{raw};
         if (!number.read(seconds) || !(std::fabs(seconds) < max_seconds)) {
-            return r.fail("a time out of range");
+            return r.fail(time_out_of_range);
         }
         value = whole_of(seconds);
         return true;
     }
-    return to_whole(negative ? -billionths : billionths, value) || r.fail("a time out of range");
+    return to_whole(negative ? -billionths : billionths, value) || r.fail(time_out_of_range);
 }
 
 void append_fraction(std::string& out, std::int64_t nanoseconds) {
@@ -260,7 +268,7 @@ bool read_time(json_reader& r, whole_time& value, std::string_view (*parse)(std:
 
 } // namespace
 
-void throw_time_out_of_range() { throw error(errc::conversion, "a time out of range"); }
+void throw_time_out_of_range() { throw error(errc::conversion, std::string{time_out_of_range}); }
 
 whole_time whole_of(double seconds) {
     if (!(std::fabs(seconds) < max_seconds)) {

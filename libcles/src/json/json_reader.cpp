@@ -5,6 +5,7 @@
 
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <system_error>
 #include <utility>
 
@@ -203,6 +204,24 @@ bool json_reader::read(double& out) {
     if (std::from_chars(digits.data(), digits.data() + digits.size(), out).ec != std::errc{}) {
         return fail("a number out of the range of a double");
     }
+    return true;
+}
+
+bool json_reader::read(float& out) {
+    std::string_view digits;
+    bool integral = false;
+    if (!require(kind::number) || !scan_number(digits, integral)) {
+        return false;
+    }
+    const auto* const end = digits.data() + digits.size();
+    if (std::from_chars(digits.data(), end, out).ec == std::errc{} && std::isfinite(out)) {
+        return true;
+    }
+    double small = 1;
+    if (std::from_chars(digits.data(), end, small).ec != std::errc{} || std::fabs(small) >= 1) {
+        return fail("a number out of the range of a float");
+    }
+    out = static_cast<float>(small); // too small for a float of full precision
     return true;
 }
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/error.hpp>
 #include <cles/json_writer.hpp>
 
 #include "json/json_scan.hpp"
@@ -74,6 +75,10 @@ void append_escape(std::string& out, char c) {
 } // namespace
 
 void json_writer::open(char bracket) {
+    if (depth_ == max_depth_) {
+        throw error(errc::conversion, "nested deeper than " + std::to_string(max_depth_) + " levels");
+    }
+    ++depth_;
     separate();
     out_.push_back(bracket);
 }
@@ -119,9 +124,9 @@ void json_writer::plain_key(const prepared_key& name) {
     out_.append(name.text().substr(is_first ? 1 : 0));
 }
 
-void json_writer::null() { raw("null"); }
+void json_writer::null() { checked("null"); }
 
-void json_writer::value(bool b) { raw(b ? "true" : "false"); }
+void json_writer::value(bool b) { checked(b ? "true" : "false"); }
 
 void json_writer::value(double d) {
     if (!std::isfinite(d)) {
@@ -150,6 +155,11 @@ void json_writer::value(std::string_view text) {
 }
 
 void json_writer::raw(std::string_view json) {
+    has_raw_ = true;
+    checked(json);
+}
+
+void json_writer::checked(std::string_view json) {
     separate();
     out_.append(json);
 }

@@ -281,7 +281,7 @@ bool job_record::start(time_point executor_due) noexcept {
             fail(errc::deadline, "its deadline had passed before it began");
         } else if (task_->plain) {
             json_writer writer{result_};
-            task_->plain(request_, writer);
+            detail::run_plain(task_->plain, request_, writer);
             result_written_ = true;
         } else {
             add_reference();

@@ -217,5 +217,5 @@ struct compact_json {
 
 template <>
 struct cles::converter<cles::runtime::compact_json> {
-    static void write(json_writer& w, const runtime::compact_json& value) { w.raw(value.text); }
+    static void write(json_writer& w, const runtime::compact_json& value) { w.checked(value.text); }
 };

@@ -5,6 +5,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -82,6 +83,17 @@ BOOST_AUTO_TEST_CASE(a_missing_or_invalid_parameter_is_bad_request_with_its_posi
     BOOST_CHECK_EXCEPTION(static_cast<void>(r.parameter<int>(4)), cles::error, no_number);
     BOOST_CHECK_EXCEPTION(static_cast<void>(r.parameter<unsigned>(1)), cles::error, no_number);
     BOOST_CHECK_EXCEPTION(static_cast<void>(r.parameter<std::uint8_t>(5)), cles::error, no_number);
+}
+
+BOOST_AUTO_TEST_CASE(a_parameter_that_is_no_finite_number_is_bad_request) {
+    const std::vector<std::string_view> words{"inf", "-inf", "nan", "1e39"};
+    data.parameters = words;
+    const auto no_number = [](const cles::error& e) { return says(e, "is not a valid number"); };
+    for (std::size_t i = 0; i < words.size(); ++i) {
+        BOOST_CHECK_EXCEPTION(static_cast<void>(request.parameter<float>(i)), cles::error, no_number);
+    }
+    BOOST_CHECK_EXCEPTION(static_cast<void>(request.parameter<double>(0)), cles::error, no_number);
+    BOOST_TEST(request.parameter<double>(3) == 1e39);
 }
 
 BOOST_AUTO_TEST_CASE(a_body_that_does_not_fit_its_type_is_bad_request_with_the_path) {

@@ -177,6 +177,33 @@ BOOST_AUTO_TEST_CASE(an_invalid_duration_is_an_error) {
     BOOST_TEST(conversion_error([] { to_json(chrono::hours::max()); }) == "a time out of range");
 }
 
+BOOST_AUTO_TEST_CASE(a_duration_of_any_length_of_text_does_not_overflow) {
+    for (const std::string_view part : {"9999999999999999999W", "-9999999999999999999W"}) {
+        for (const std::size_t count : {2, 15'182, 15'183, 30'000}) { // of which the third passes 2 to the 127
+            for (const std::string_view sign : {"", "-"}) {
+                std::string text = "\"" + std::string{sign} + "P";
+                for (std::size_t i = 0; i < count; ++i) {
+                    text.append(part);
+                }
+                text.push_back('"');
+                BOOST_TEST(why<chrono::milliseconds>(text) == "a time out of range", count);
+                BOOST_TEST(why<chrono::duration<double>>(text) == "a time out of range", count);
+            }
+        }
+    }
+    BOOST_TEST((from_json<chrono::seconds>("\"P9999999999999W-9999999999999W1D\"") == 24h));
+}
+
+BOOST_AUTO_TEST_CASE(a_floating_point_duration_out_of_range_is_an_error) {
+    BOOST_TEST(why<chrono::duration<float>>("1e39") == "a time out of range");
+    BOOST_TEST(why<chrono::duration<float>>("\"PT" + std::string(40, '9') + "S\"") == "a time out of range");
+    BOOST_TEST((why<chrono::duration<double, std::nano>>("1e300") == "a time out of range"));
+    BOOST_TEST(conversion_error([] { to_json(chrono::duration<double, std::exa>{1e300}); }) == "a time out of range");
+    const auto most = std::numeric_limits<float>::max();
+    BOOST_TEST(round_trip(chrono::duration<float>{most}).count() == most);
+    BOOST_TEST((from_json<chrono::duration<float, std::milli>>("1.5").count() == 1500.0F));
+}
+
 BOOST_AUTO_TEST_CASE(durations_survive_a_round_trip) {
     for (const auto count :
          {std::int64_t{0}, std::int64_t{1}, std::int64_t{-1}, std::int64_t{999'999'999}, std::int64_t{-1'000'000'001},

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/convert.hpp>
+#include <cles/convert_wrapped.hpp>
 
 #include "support/converted.hpp"
 
@@ -10,12 +11,14 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <map>
 #include <optional>
 #include <random>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace convert_types {
@@ -55,7 +58,34 @@ struct celsius {
     double degrees = 0;
 };
 
+struct tree {
+    std::vector<tree> below;
+};
+BOOST_DESCRIBE_STRUCT(tree, (), (below))
+
+// As structs of C have it.
+struct interface {
+    char name[8]; // NOLINT(modernize-avoid-c-arrays)
+    char key[16]; // NOLINT(modernize-avoid-c-arrays): not described, and not to be sent
+    int index = 1;
+};
+BOOST_DESCRIBE_STRUCT(interface, (), (name, index))
+
+struct place {
+    const char* name = nullptr;
+};
+BOOST_DESCRIBE_STRUCT(place, (), (name))
+
+struct passed_on {
+    std::string text;
+};
+
 } // namespace convert_types
+
+template <>
+struct cles::converter<convert_types::passed_on> {
+    static void write(json_writer& w, const convert_types::passed_on& value) { w.raw(value.text); }
+};
 
 template <>
 struct cles::converter<convert_types::celsius> {
@@ -116,6 +146,55 @@ BOOST_AUTO_TEST_CASE(a_double_reads_any_number_and_round_trips_exactly) {
             BOOST_REQUIRE(std::bit_cast<std::uint32_t>(round_trip(f)) == std::bit_cast<std::uint32_t>(f));
         }
     }
+}
+
+BOOST_AUTO_TEST_CASE(a_float_out_of_range_is_an_error) {
+    for (const std::string_view text : {"1e39", "-1e39", "3.5e38", "1e300", "1e400"}) {
+        BOOST_TEST(why<float>(text) == "a number out of the range of a float", text);
+    }
+    for (const std::string_view text :
+         {"3.4028235e38", "-3.4028235e38", "3.40282346638528859811704183484516925440e38"}) {
+        BOOST_TEST(std::fabs(from_json<float>(text)) == std::numeric_limits<float>::max(), text);
+    }
+    BOOST_TEST(from_json<float>("1e-50") == 0.0F);
+    BOOST_TEST(from_json<float>("1.4e-45") == std::numeric_limits<float>::denorm_min());
+    BOOST_TEST(why<std::vector<float>>("[1,1e39]") == "[1]: a number out of the range of a float");
+    BOOST_TEST(why<float>("\"1\"") == "expected a number, got a string");
+}
+
+BOOST_AUTO_TEST_CASE(a_long_double_that_no_double_holds_is_not_written) {
+    if constexpr (std::numeric_limits<long double>::max() > std::numeric_limits<double>::max()) {
+        BOOST_CHECK_EXCEPTION(to_json(std::numeric_limits<long double>::max()), cles::error, [](const cles::error& e) {
+            return e.code() == cles::errc::conversion && e.message() == "a number out of the range of a double";
+        });
+    }
+    BOOST_TEST(to_json(0.5L) == "0.5");
+    BOOST_TEST(to_json(std::numeric_limits<long double>::infinity()) == "null");
+}
+
+BOOST_AUTO_TEST_CASE(an_array_of_char_ends_with_the_array) {
+    interface can {};
+    std::memcpy(can.name, "vcan0-in", sizeof can.name);
+    std::memcpy(can.key, "SECRET-KEY-0123", sizeof can.key);
+    BOOST_TEST(to_json(can) == R"({"name":"vcan0-in","index":1})");
+    std::memcpy(can.name, "lo", 3);
+    BOOST_TEST(to_json(can) == R"({"name":"lo","index":1})");
+    BOOST_TEST(cles::detail::to_body(can.name) == R"({"value":"lo"})");
+}
+
+BOOST_AUTO_TEST_CASE(a_null_pointer_to_text_is_null) {
+    BOOST_TEST(to_json(static_cast<const char*>(nullptr)) == "null");
+    BOOST_TEST(to_json(place{}) == R"({"name":null})");
+    BOOST_TEST(cles::detail::to_body(static_cast<const char*>(nullptr)) == R"({"value":null})");
+}
+
+BOOST_AUTO_TEST_CASE(an_integer_of_more_than_64_bits_does_not_convert) {
+#if defined(__SIZEOF_INT128__)
+    __extension__ using wide = __int128;
+    __extension__ using unsigned_wide = unsigned __int128;
+    static_assert(!cles::detail::writable<wide> && !cles::detail::readable<wide>);
+    static_assert(!cles::detail::writable<unsigned_wide> && !cles::detail::readable<unsigned_wide>);
+#endif
 }
 
 BOOST_AUTO_TEST_CASE(a_number_that_is_not_finite_becomes_null_and_reads_as_nan) {
@@ -290,6 +369,45 @@ BOOST_AUTO_TEST_CASE(the_whole_text_must_be_read) {
 BOOST_AUTO_TEST_CASE(depth_is_limited_while_reading) {
     const auto deep = std::string(33, '[') + std::string(33, ']');
     BOOST_TEST(why<cles::json_text>(deep) == "nested deeper than 32 levels");
+}
+
+BOOST_AUTO_TEST_CASE(what_readers_refuse_is_not_written) {
+    const auto refused = [](const auto& value) {
+        try {
+            return to_json(value);
+        } catch (const cles::error& e) {
+            return e.message();
+        }
+    };
+    tree whole;
+    auto* lowest = &whole;
+    for (int levels = 2; levels < 34; levels += 2) { // each tree is an object and an array
+        lowest = &lowest->below.emplace_back();
+    }
+    BOOST_TEST(cles::is_valid_json(to_json(whole), cles::json_writer::most_levels));
+    lowest->below.emplace_back();
+    BOOST_TEST(refused(whole) == "nested deeper than 35 levels");
+    for (int i = 0; i < 1000; ++i) { // does not recurse to the end
+        lowest = &lowest->below.emplace_back();
+    }
+    BOOST_TEST(refused(whole) == "nested deeper than 35 levels");
+
+    const cles::json_text deep{std::string(32, '[') + std::string(32, ']')};
+    BOOST_TEST(to_json(deep) == deep.text);
+    using texts = std::vector<cles::json_text>;
+    const std::vector<std::vector<texts>> inside{{{deep}}};
+    BOOST_TEST(cles::is_valid_json(to_json(inside), cles::json_writer::most_levels));
+    BOOST_TEST(refused(std::vector<std::vector<std::vector<texts>>>{inside}).find("nested deeper than 31") !=
+               std::string::npos);
+
+    BOOST_TEST(to_json(passed_on{"[1]"}) == "[1]");
+    BOOST_TEST(refused(passed_on{"[1"}).starts_with("what was written is not JSON: "));
+    BOOST_TEST(refused(std::vector{passed_on{"1,\"\xFF\""}}).starts_with("what was written is not JSON: "));
+    BOOST_TEST(refused(passed_on{"}],{"}).starts_with("what was written is not JSON: "));
+    BOOST_TEST(refused(passed_on{"[1,\n2]"}) == "what was written contains a line feed");
+    BOOST_TEST(refused(passed_on{std::string(36, '[') + std::string(36, ']')}).find("nested deeper than 35") !=
+               std::string::npos);
+    BOOST_TEST(refused(std::pair{passed_on{"}"}, std::string{"\xFF"}}).find("not UTF-8") != std::string::npos);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -167,7 +167,7 @@ void publications::publish(std::string_view path, const std::function<void(json_
     try {
         json_writer writer{line};
         write(writer);
-        cles::detail::require_utf8(writer);
+        cles::detail::require_readable(writer);
         close_body(line, body);
         body = is_signed ? sign(t, line, body) : body;
         end(t, body - start);
@@ -214,7 +214,7 @@ void publications::take_memory(topic& t) {
 }
 
 void publications::publish_body(std::string_view path, std::string_view body) {
-    publish(path, [body](json_writer& w) { w.raw(body); });
+    publish(path, [body](json_writer& w) { w.checked(body); });
 }
 
 void publications::end(topic& t, std::size_t body_at) {

@@ -2,6 +2,7 @@
 #include "node/session/request_checks.hpp"
 
 #include <cles/json_reader.hpp>
+#include <cles/pending.hpp>
 
 #include "port/node_security.hpp"
 #include "protocol/grammar.hpp"
@@ -166,7 +167,9 @@ std::optional<protocol::failure> refusal_reason(const node_state& n, const ident
                                            " before: the nodes in 'via' form a loop");
     }
     std::string why;
-    if (!r.body.empty() && !is_valid_json(r.body, n.bounds.depth, &why)) {
+    // What is published has to be readable for all subscribers, whatever this node accepts.
+    const auto depth = r.verb == verb::update ? std::min(n.bounds.depth, detail::answer_depth) : n.bounds.depth;
+    if (!r.body.empty() && !is_valid_json(r.body, depth, &why)) {
         return object(errc::bad_request, n.name + ": the body is not valid JSON: " + why);
     }
     if (r.verb == verb::update && protocol::begins_with_error(r.body)) {
