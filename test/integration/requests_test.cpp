@@ -11,6 +11,7 @@
 #include "support/scripted_peer.hpp"
 
 #include <boost/asio/error.hpp>
+#include <boost/describe.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
@@ -18,6 +19,7 @@
 #include <chrono>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 BOOST_AUTO_TEST_SUITE(requests)
@@ -28,6 +30,12 @@ using cles::errc;
 
 constexpr std::array carriers{carrier::tcp4, carrier::tcp6, carrier::unix_file, carrier::unix_abstract,
                               carrier::inproc};
+
+// Each link takes two levels of brackets.
+struct chain {
+    std::vector<chain> next{};
+};
+BOOST_DESCRIBE_STRUCT(chain, (), (next))
 
 // Two services, one of which serves a task for every verb.
 struct two_nodes {
@@ -71,6 +79,59 @@ CLES_DATA_TEST_CASE(what_is_urgent_does_not_wait_behind_large_answers, carriers,
     BOOST_TEST(!large.back().done());
     n.wait_for(large.back());
     BOOST_TEST(large.back().value.text.size() > 900'000U);
+}
+
+CLES_DATA_TEST_CASE(a_command_whose_body_has_several_lines_is_sent_as_one, carriers, kind) {
+    two_nodes n{kind};
+    answer<> echoed;
+    n.tower.async_request("PUSH car1:echo {\n  \"a\": [1,\r\n\t2],\n  \"b\": \"x\\n y\"\n}\n", echoed.take());
+    n.wait_for(echoed);
+    BOOST_TEST(!echoed.code);
+    BOOST_TEST(echoed.value.text == R"({"a":[1,2],"b":"x\n y"})");
+    answer<> counted;
+    n.tower.async_request("PULL car1:cles/metrics", counted.take());
+    n.wait_for(counted);
+    BOOST_TEST(counted.value.text.find("\"errors\":0,") != std::string::npos, counted.value.text);
+}
+
+CLES_DATA_TEST_CASE(a_result_that_no_requester_would_read_fails_at_once, carriers, kind) {
+    two_nodes n{kind};
+    n.car.on_pull("chain", [](const cles::request& r) {
+        chain made;
+        for (auto left = r.parameter<int>(0); left > 1; --left) {
+            made = chain{{std::move(made)}};
+        }
+        return made;
+    });
+    n.car.on_pull("later", [](const cles::request& r, const cles::responder& to) {
+        chain made;
+        for (auto left = r.parameter<int>(0); left > 1; --left) {
+            made = chain{{std::move(made)}};
+        }
+        to.done(made);
+    });
+    for (const std::string task : {"chain", "later"}) {
+        answer<> fits;
+        n.tower.async_pull("car1:" + task + "/17", fits.take());
+        n.wait_for(fits);
+        BOOST_TEST(!fits.code, task);
+        answer<> too_deep;
+        n.tower.async_pull("car1:" + task + "/18", too_deep.options().deadline(1h), too_deep.take());
+        n.wait_for(too_deep); // an hour before its deadline
+        BOOST_TEST((too_deep.code == errc::failed), task);
+        BOOST_TEST(too_deep.words == "car1: nested deeper than 35 levels", task);
+    }
+    chain body;
+    for (int i = 0; i < 40; ++i) {
+        body = chain{{std::move(body)}};
+    }
+    answer<> sent;
+    n.tower.async_push("car1:echo", body, sent.options(), sent.take());
+    n.wait_for(sent);
+    BOOST_TEST((sent.code == errc::conversion));
+    BOOST_TEST(sent.words == "nested deeper than 35 levels");
+    BOOST_CHECK_EXCEPTION(n.car.update("state", body), cles::error,
+                          [](const cles::error& e) { return e.code() == errc::conversion; });
 }
 
 CLES_DATA_TEST_CASE(pull_gives_data_typed_and_raw, carriers, kind) {

@@ -104,6 +104,17 @@ BOOST_AUTO_TEST_CASE(a_job_asks_another_node_and_replies_with_the_result) {
     BOOST_TEST(user_answer.value.text == R"({"value":7})");
 }
 
+BOOST_AUTO_TEST_CASE(a_command_of_several_lines_is_one_request) {
+    tower->on_push("echo", [](const cles::request& r) { return cles::json_text{std::string{r.body()}}; });
+    begin = [this](const cles::responder& answer) {
+        answer.delegate("PUSH tower:echo {\n  \"a\": [1,\n2]\n}", heard());
+    };
+    ask();
+    until([&] { return answers == 1; });
+    BOOST_TEST(heard_words == "");
+    BOOST_TEST(heard_json == R"({"a":[1,2]})");
+}
+
 BOOST_AUTO_TEST_CASE(what_it_asks_has_no_longer_than_itself_or_less_where_it_says_so) {
     begin = [this](const cles::responder& answer) {
         answer.delegate("DELEGATE tower:plan", heard());

@@ -354,7 +354,9 @@ std::uint64_t local_node::send_command(std::string_view command, const call_opti
     chosen.urgent(chosen.urgent_ || parsed.urgent);
     chosen.hops(parsed.hops == protocol::default_hops ? chosen.hops_ : parsed.hops);
     const auto noun = std::string{parsed.noun.target} + ":" + std::string{parsed.noun.path};
-    return send(parsed.verb, noun, parsed.body, chosen, std::move(operation));
+    std::string body; // a line feed in it would end the request's line
+    append_compact_json(parsed.body, body);
+    return send(parsed.verb, noun, body, chosen, std::move(operation));
 }
 
 void local_node::cancel(std::uint64_t ticket) {

@@ -64,4 +64,19 @@ void node_state::post_log(log_level level, std::string what, std::string peer) {
     }
 }
 
+void node_state::log_drop(std::string_view host, std::string_view what, std::string_view why, bool malformed) {
+    if (!log) {
+        return;
+    }
+    const auto left_out = (malformed ? malformed_drops : other_drops).take(host, time.now());
+    if (!left_out) {
+        return;
+    }
+    auto text = "dropped " + std::string{what} + " of " + std::string{host} + ": " + std::string{why};
+    if (*left_out != 0) {
+        text.append(" (and " + std::to_string(*left_out) + " since the last such line)");
+    }
+    post_log(malformed ? log_level::warning : log_level::debug, std::move(text), std::string{host});
+}
+
 } // namespace cles::core

@@ -8,6 +8,7 @@
 
 #include "node/base/completion_queue.hpp"
 #include "node/base/deadlines.hpp"
+#include "node/base/log_budget.hpp"
 #include "node/base/memory_budget.hpp"
 #include "node/base/metrics.hpp"
 #include "node/membership/membership.hpp"
@@ -20,6 +21,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace cles::detail {
@@ -109,6 +111,12 @@ struct node_state {
     void write_log(log_level level, const log_entry& what) const noexcept;
     /// The same from inside a loop over data that the log function could change.
     void post_log(log_level level, std::string what, std::string peer = {});
+    /// Logs that something of this host was dropped, once a minute for each host. `malformed`: no node should send it;
+    /// anything else is told at `debug`. The text must not be of the peer.
+    [[gnu::cold]] void log_drop(std::string_view host, std::string_view what, std::string_view why, bool malformed);
+
+    log_budget malformed_drops;
+    log_budget other_drops;
 };
 
 } // namespace cles::core

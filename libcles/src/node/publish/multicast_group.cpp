@@ -2,6 +2,7 @@
 #include "node/publish/multicast_group.hpp"
 
 #include <cles/json_reader.hpp>
+#include <cles/pending.hpp>
 
 #include "node/membership/membership.hpp"
 #include "node/security_protocol.hpp"
@@ -234,6 +235,9 @@ bool multicast_group::take(const group_datagram& datagram, time_point now) {
         ++counts.group_repeated;
     } else {
         ++counts.updates_dropped;
+        if (std::string why; !update.body.empty() && !is_valid_json(update.body, detail::answer_depth, &why)) {
+            node_->log_drop(host_text(from), "an update", "its body is no JSON: " + why, true);
+        }
     }
     return true;
 }

@@ -370,10 +370,23 @@ void scatter_gather::withdraw() {
 // -- the reply -----------------------------------------------------------------------------------------------------
 
 void aggregate_reply::add(std::string_view node, const node_outcome& found) {
+    constexpr std::size_t levels_around = 2;
+    constexpr auto depth = detail::answer_depth - levels_around;
     if (!found.result) {
         begin_member(errors_, node);
-        const protocol::failure late{.code = errc::deadline, .message = std::string{node} + " did not answer in time"};
-        append_failure(errors_, found.failure ? *found.failure : late);
+        protocol::failure why{.code = errc::deadline, .message = std::string{node} + " did not answer in time"};
+        why = found.failure.value_or(why);
+        if (!is_valid_json(why.answer, depth)) {
+            why.answer.clear(); // its code and message are enough
+        }
+        append_failure(errors_, why);
+        return;
+    }
+    if (!is_valid_json(*found.result, depth)) { // the requester would drop the whole reply
+        add(node, {.failure = protocol::failure{.code = errc::failed,
+                                                .message = std::string{node} + ": the answer is nested deeper than " +
+                                                           std::to_string(depth) + " levels",
+                                                .ran = true}});
         return;
     }
     begin_member(results_, node);

@@ -162,11 +162,10 @@ void outbound::rearm(std::unique_ptr<entry> e, time_point due) {
     waiting_.emplace(id, std::move(e));
 }
 
-void outbound::on_reply(const protocol::reply_line& reply) {
+bool outbound::on_reply(const protocol::reply_line& reply) {
     auto e = take(reply.id - first_id_); // a smaller id wraps around and matches no request
     if (!e) {
-        ++node_.counts.replies_dropped;
-        return;
+        return false;
     }
     const auto due = e->due();
     bool ended = false;
@@ -180,7 +179,7 @@ void outbound::on_reply(const protocol::reply_line& reply) {
             if (!late) {
                 node_.completions.now([&] { report(*reply.progress, reply.body); });
             }
-            return;
+            return true;
         }
     } else if (protocol::is_failure(reply.body)) {
         protocol::failure why;
@@ -189,7 +188,7 @@ void outbound::on_reply(const protocol::reply_line& reply) {
             const auto progress = std::move(e->progress); // user code too: destroyed after the operation has completed
             recycle(std::move(e));
             node_.completions.now([&] { operation->refuse(why.code, why.message, reply.body); });
-            return;
+            return true;
         }
     } else {
         auto* operation = e->operation.release();
@@ -207,9 +206,9 @@ void outbound::on_reply(const protocol::reply_line& reply) {
         const auto progress = std::move(e->progress);
         recycle(std::move(e));
     } else {
-        ++node_.counts.replies_dropped;
         rearm(std::move(e), due);
     }
+    return ended;
 }
 
 void outbound::on_overlong(const protocol::reply_line& reply) {

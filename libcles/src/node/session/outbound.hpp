@@ -55,7 +55,8 @@ class outbound {
     [[gnu::cold]] bool cancel(std::uint64_t id);
     /// Discards a request and its operation, without notifying anyone.
     [[gnu::cold]] void drop(std::uint64_t id);
-    void on_reply(const protocol::reply_line& reply);
+    /// Returns false if nobody waits for it, or it is malformed: it is dropped.
+    bool on_reply(const protocol::reply_line& reply);
     /// A reply over the line limit.
     [[gnu::cold]] void on_overlong(const protocol::reply_line& reply);
     /// The peer has restarted. Requests that it may have run fail, except PULL and BIND, which are sent again.

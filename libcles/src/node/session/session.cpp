@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/session.hpp"
 
+#include <cles/json_reader.hpp>
+#include <cles/pending.hpp>
+
+#include "node/membership/reachable_endpoints.hpp"
 #include "node/session/request_checks.hpp"
 #include "protocol/line.hpp"
 #include "protocol/request_line.hpp"
@@ -22,6 +26,13 @@ bool is_web_datagram(std::string_view datagram) {
         datagram.remove_prefix(std::min(end + 1, datagram.size()));
     }
     return false;
+}
+
+// Why no reader accepts the body of a reply or an update; empty if one does.
+std::string why_unreadable(std::string_view body) {
+    std::string why;
+    return body.empty() || is_valid_json(body, detail::answer_depth, &why) ? std::string{}
+                                                                           : "its body is no JSON: " + why;
 }
 
 // Whether the peer announces that it leaves: what it has not answered by then, it has not started (docs/protocol.md,
@@ -110,11 +121,19 @@ void session::lose_requests(std::string_view why) {
 
 void session::on_reply(std::string_view line) {
     protocol::reply_line reply;
-    if (protocol::parse_reply(line, reply) && reply.id != 0) {
-        outbound_.on_reply(reply);
-    } else {
-        ++node_->counts.replies_dropped;
+    if (!protocol::parse_reply(line, reply) || reply.id == 0) {
+        drop_reply(refusal_.empty() ? "it has no valid head" : ""); // a refusal of the link answers no request
+    } else if (!outbound_.on_reply(reply)) {
+        drop_reply(node_->log ? why_unreadable(reply.body) : "");
     }
+}
+
+void session::drop_reply(std::string_view why) {
+    ++node_->counts.replies_dropped;
+    if (!node_->log) {
+        return;
+    }
+    node_->log_drop(host_of(peer_), "a reply", why.empty() ? "nobody waits for it" : why, !why.empty());
 }
 
 void session::on_update(const subscriptions::match& found) {
@@ -123,9 +142,25 @@ void session::on_update(const subscriptions::match& found) {
         return;
     }
     if (found.whose == nullptr || protocol::begins_with_error(update.body) || !subscriptions_.deliver(found)) {
-        ++node_->counts.updates_dropped;
+        drop_update(found);
     } else {
         ++node_->counts.updates_received;
+    }
+}
+
+void session::drop_update(const subscriptions::match& found) {
+    ++node_->counts.updates_dropped;
+    const auto& body = found.update->body;
+    if (!node_->log) {
+        return;
+    }
+    if (found.whose == nullptr) {
+        node_->log_drop(host_of(peer_), "an update", "nobody here has bound it", false);
+    } else if (protocol::begins_with_error(body)) {
+        node_->log_drop(host_of(peer_), "an update", "its first key is 'error'", true);
+    } else {
+        const auto why = why_unreadable(body);
+        node_->log_drop(host_of(peer_), "an update", why.empty() ? "it is old, or repeated" : why, !why.empty());
     }
 }
 
@@ -155,7 +190,7 @@ void session::send_leave_notice() {
 // The id for the reply is in the first line.
 void session::refuse(std::string_view text, const char* why) {
     if (protocol::is_reply(text)) {
-        ++node_->counts.replies_dropped;
+        drop_reply(why);
         return;
     }
     auto meant = protocol::salvage(protocol::trim(text.substr(0, text.find('\n'))));
@@ -182,8 +217,8 @@ void session::on_overlong(std::string_view head) {
         inbound_.on_overlong(head);
         return;
     }
+    drop_reply("it is longer than the limit");
     if (out_.is_datagram()) {
-        ++node_->counts.replies_dropped;
         return;
     }
     protocol::reply_line reply;
@@ -191,7 +226,6 @@ void session::on_overlong(std::string_view head) {
     if (reply.id != 0) {
         outbound_.on_overlong(reply);
     }
-    ++node_->counts.replies_dropped;
     closed_ = true;
     out_.finish();
 }

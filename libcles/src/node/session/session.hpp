@@ -47,6 +47,9 @@ class session {
   private:
     [[gnu::cold]] void refuse(std::string_view text, const char* why);
     void on_reply(std::string_view line);
+    /// Counts and logs a reply that has no effect. \param why it is malformed; empty: nobody waits for it
+    [[gnu::cold]] void drop_reply(std::string_view why);
+    [[gnu::cold]] void drop_update(const subscriptions::match& found);
     [[gnu::cold]] void note_refusal(std::string_view line);
     [[gnu::cold]] void lose_requests(std::string_view why);
     [[gnu::cold]] void on_leaving();

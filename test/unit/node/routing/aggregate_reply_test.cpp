@@ -46,6 +46,23 @@ BOOST_AUTO_TEST_CASE(what_is_no_name_in_the_reply_of_a_pool_is_left_out) {
     BOOST_TEST(answer.whole() == R"({"results":{"north.car1":4},"errors":{}})");
 }
 
+BOOST_AUTO_TEST_CASE(an_answer_too_deep_to_be_read_as_a_part_costs_itself_alone) {
+    const auto nested = [](std::size_t levels) { return std::string(levels, '[') + std::string(levels, ']'); };
+    cles::core::aggregate_reply answer;
+    answer.add("car1", {.result = nested(33)});
+    answer.add("car2", {.result = nested(34)});
+    answer.add("car3", {.failure = failure{.code = cles::errc::busy,
+                                           .message = "full",
+                                           .answer = R"({"error":"busy","x":)" + nested(33) + "}"}});
+    const auto text = answer.whole();
+    BOOST_TEST(cles::is_valid_json(text, cles::json_writer::most_levels), text);
+    BOOST_TEST(text.find(R"("car1":[[)") != std::string::npos, text);
+    BOOST_TEST(text.find(R"("car2":{"error":"failed","message":"car2: the answer is nested deeper than 33 levels",)"
+                         R"("ran":true})") != std::string::npos,
+               text);
+    BOOST_TEST(text.find(R"("car3":{"error":"busy","message":"full")") != std::string::npos, text);
+}
+
 BOOST_AUTO_TEST_CASE(pools_without_a_provider_add_nothing) {
     cles::core::aggregate_reply answer;
     answer.add_pool("west", {.failure = failure{.code = cles::errc::no_target, .message = "no known node offers it"}});

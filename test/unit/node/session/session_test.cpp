@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/session.hpp"
+#include "support/sent_request.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>
 
+#include <chrono>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -104,6 +106,44 @@ BOOST_AUTO_TEST_CASE(a_reply_is_never_answered) {
     }
     BOOST_TEST(counts().replies_dropped == 7U);
     BOOST_TEST(counts().errors == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_dropped_is_logged_once_a_minute) {
+    std::vector<std::string> logged;
+    cles::test::test_node hearing{{}, {}, [&](cles::log_level level, const cles::log_entry& entry) {
+                                      const bool loud = level == cles::log_level::warning;
+                                      logged.push_back((loud ? "warning: " : "debug: ") + std::string{entry.text});
+                                  }};
+    cles::test::test_link from{hearing};
+    const auto last = [&] { return logged.empty() ? std::string{} : logged.back(); };
+
+    const auto asked = cles::test::send_on(from, hearing, {.verb = verb::pull, .noun = "car2:tree", .id = 7});
+    from.ask("id=7 " + std::string(36, '[') + std::string(36, ']'));
+    BOOST_TEST(!asked->ended);
+    BOOST_TEST(last().starts_with("warning: dropped a reply of 127.0.0.1: its body is no JSON: nested deeper than 35"),
+               last());
+    from.ask("id=7 {\"a\":}");
+    from.ask("id=x {}");
+    BOOST_TEST(logged.size() == 1U);
+    from.ask("id=9 {}"); // of another kind: nobody may be to blame
+    BOOST_TEST(last() == "debug: dropped a reply of 127.0.0.1: nobody waits for it");
+    hearing.clock.advance(std::chrono::minutes{1});
+    from.ask("id=x {}");
+    BOOST_TEST(last() ==
+               "warning: dropped a reply of 127.0.0.1: it has no valid head (and 2 since the last such line)");
+
+    hearing.clock.advance(std::chrono::minutes{1});
+    listener bound{"car2", "speed", false, 16};
+    from.session().bound().add(bound);
+    from.ask("UPDATE car2:speed seq=1 epoch=00000001 {\"v\":\"\xFF\"}");
+    BOOST_TEST(last() == "warning: dropped an update of 127.0.0.1: its body is no JSON: invalid UTF-8 in a string (at "
+                         "byte 6)");
+    from.ask("UPDATE car2:speed seq=1 epoch=00000001 {}");
+    from.ask("UPDATE car2:speed seq=1 epoch=00000001 {}");
+    BOOST_TEST(last() == "debug: dropped an update of 127.0.0.1: it is old, or repeated");
+    BOOST_TEST(hearing.counts().replies_dropped == 5U);
+    BOOST_TEST(hearing.counts().updates_dropped == 2U);
+    from.session().bound().remove(bound);
 }
 
 BOOST_AUTO_TEST_CASE(http_closes_the_link_without_a_reply) {
