@@ -48,7 +48,7 @@ def strike(programs):
             raise Trouble(f"no order was carried out: {mission.events}")
         for event in mission.all("bound") + mission.all("strike") + mission.all("assessed"):
             print("  mission: " + event["text"].splitlines()[0], flush=True)
-        order = '{"id":"o1","lat":33.2,"lon":-106.4,"ve":0,"vn":0,"sigma":3,"sigma_v":1,"utc":0,"deadline_ms":1000}'
+        order = '{"id":"o1","lat":33.2,"lon":-106.4,"ve":0,"vn":0,"sigma":3,"sigma_v":1,"utc":0}'
         for member in ("recon", "operator"):
             print(f"  $ cles delegate strike1:strike -d '...' --keys fleet/{member}")
             done = striker.ask(member, "delegate", "strike1:strike", "-d", order)

@@ -61,7 +61,6 @@ boost::asio::awaitable<void> give_orders(cles::service& from, const drill_option
                                  .sigma = 3,
                                  .sigma_v = 1,
                                  .utc = utc_now(),
-                                 .deadline_ms = deadline_ms,
                                  .drill = true};
         const auto begun = steady::now();
         const auto outcome = co_await from.async_delegate<strike::outcome>(noun, what, options);

@@ -158,7 +158,6 @@ void mission::decide(const fmv::track& target) {
     auto record = begin_story(seen, target, received_utc_, utc_now());
     record.order = args_.name + "-" + run_ + "-" + std::to_string(commander_.fates().given + 1);
     auto what = order_against(target, seen.captured, record.order);
-    what.deadline_ms = args_.deadline_ms;
     commander_.ordered(target);
     events_.log("decided", "order " + record.order + ": strike target " + std::to_string(target.id), record);
     boost::asio::co_spawn(io_, give(what, std::move(record)), boost::asio::detached);
@@ -183,9 +182,8 @@ boost::asio::awaitable<void> mission::give(strike::order what, story record) {
         const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begun;
         record.fate = "done";
         record.struck_by = record.outcome.node;
-        record.strike_queue_ms = record.outcome.queue_ms;
         record.strike_run_ms = record.outcome.run_ms;
-        record.strike_way_ms = took.count() - record.strike_queue_ms - record.strike_run_ms;
+        record.strike_way_ms = took.count() - record.strike_run_ms;
         record.data_to_answer_ms = (sent - what.utc) * 1000 + took.count();
     } catch (const cles::error& e) {
         record.fate = fate_of(e);

@@ -38,7 +38,6 @@ std::string to_text(const story& what) {
     row("data to decision", what.data_to_decision_ms);
     if (!what.struck_by.empty()) {
         row("to " + what.struck_by + " and back", what.strike_way_ms);
-        row("waited at " + what.struck_by, what.strike_queue_ms);
         row("carried out at " + what.struck_by, what.strike_run_ms);
         row("data to answer", what.data_to_answer_ms);
     }

@@ -30,7 +30,6 @@ struct story {
     double decide_ms = 0;
     double data_to_decision_ms = 0; ///< the sum of these
     double strike_way_ms = 0;       ///< there and back
-    double strike_queue_ms = 0;
     double strike_run_ms = 0;
     double data_to_answer_ms = 0; ///< the sum of all
     strike::outcome outcome{};
@@ -38,7 +37,7 @@ struct story {
 BOOST_DESCRIBE_STRUCT(story, (),
                       (order, target, frame, fate, trouble, processed_by, struck_by, encode_ms, fmv_way_ms,
                        fmv_queue_ms, fmv_run_ms, publish_ms, tracks_way_ms, decide_ms, data_to_decision_ms,
-                       strike_way_ms, strike_queue_ms, strike_run_ms, data_to_answer_ms, outcome))
+                       strike_way_ms, strike_run_ms, data_to_answer_ms, outcome))
 
 /// The part until the decision.
 story begin_story(const picture& seen, const fmv::track& target, double received_utc, double decided_utc);

@@ -19,10 +19,9 @@ struct order {
     double sigma = 0;   ///< m, standard deviation of the place, per axis
     double sigma_v = 0; ///< m/s, the same of the velocity
     double utc = 0;
-    std::uint64_t deadline_ms = 0; ///< as in the request: the waiting time is this minus the time left
-    std::optional<bool> drill{};   ///< all but the release
+    std::optional<bool> drill{}; ///< all but the release
 };
-BOOST_DESCRIBE_STRUCT(order, (), (id, lat, lon, ve, vn, sigma, sigma_v, utc, deadline_ms, drill))
+BOOST_DESCRIBE_STRUCT(order, (), (id, lat, lon, ve, vn, sigma, sigma_v, utc, drill))
 
 /// What came of an order that was carried out.
 struct outcome {
@@ -35,10 +34,8 @@ struct outcome {
     double impact_utc = 0;
     double flight_s = 0;
     std::uint64_t left = 0; ///< weapons
-    double queue_ms = 0;    ///< from the order's arrival until it was looked at
     double run_ms = 0;
 };
-BOOST_DESCRIBE_STRUCT(outcome, (),
-                      (node, order, aim_lat, aim_lon, sigma, plots, impact_utc, flight_s, left, queue_ms, run_ms))
+BOOST_DESCRIBE_STRUCT(outcome, (), (node, order, aim_lat, aim_lon, sigma, plots, impact_utc, flight_s, left, run_ms))
 
 } // namespace strike

@@ -77,7 +77,6 @@ void check(const order& what, double age, const aircraft& own) {
 
 void carry_out(const cles::request& asked, const cles::responder& answer, aircraft& own) {
     const auto begun = steady::now();
-    const auto left = asked.deadline() - cles::time_point::clock::now();
     const auto what = asked.as<order>();
     const std::scoped_lock guard{own.lock};
     const double now = utc_now();
@@ -94,7 +93,6 @@ void carry_out(const cles::request& asked, const cles::responder& answer, aircra
     if (!what.drill.value_or(false)) {
         own.weapons.release(what.id);
     }
-    const auto whole = milliseconds{static_cast<double>(what.deadline_ms)};
     answer.done(outcome{.node = std::string{asked.node()},
                         .order = what.id,
                         .aim_lat = hit->at.lat,
@@ -104,7 +102,6 @@ void carry_out(const cles::request& asked, const cles::responder& answer, aircra
                         .impact_utc = now + hit->after_s,
                         .flight_s = hit->after_s,
                         .left = own.weapons.left(),
-                        .queue_ms = std::max(0.0, (whole - milliseconds{left}).count()),
                         .run_ms = milliseconds{steady::now() - begun}.count()});
 }
 

@@ -23,8 +23,7 @@ OBSERVER = {"observer": {"may": ["bind recon:tracks", *FINDS], "offers": []}}
 
 
 def order(name="o1"):
-    return json.dumps({"id": name, "lat": 33.2, "lon": -106.4, "ve": 1, "vn": 1, "sigma": 3, "sigma_v": 1, "utc": time.time(),
-                       "deadline_ms": 3000})
+    return json.dumps({"id": name, "lat": 33.2, "lon": -106.4, "ve": 1, "vn": 1, "sigma": 3, "sigma_v": 1, "utc": time.time()})
 
 
 def run(*arguments):

@@ -27,7 +27,7 @@ class StoryTest(unittest.TestCase):
         self.assertEqual(told["processed_by"], "sat1")
         for step in ("encode_ms", "fmv_way_ms", "fmv_run_ms", "strike_way_ms", "strike_run_ms"):
             self.assertGreater(told[step], 0, step)
-        for step in ("fmv_queue_ms", "strike_queue_ms"):
+        for step in ("fmv_queue_ms",):
             self.assertGreaterEqual(told[step], 0, step)
         self.assertAlmostEqual(sum(told[step] for step in STEPS), told["data_to_decision_ms"], 2)
         self.assertGreater(told["data_to_answer_ms"], told["data_to_decision_ms"])

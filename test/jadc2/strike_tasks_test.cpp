@@ -33,7 +33,7 @@ struct fixture : cles::test::asked_node {
     std::string give(const strike::order& what) { return ask("DELEGATE self:strike " + cles::to_json(what)); }
     static strike::order order(const std::string& id) {
         const auto at = plane.to_geographic({.east = 300, .north = 400});
-        return {.id = id, .lat = at.lat, .lon = at.lon, .sigma = 3, .sigma_v = 1, .utc = now(), .deadline_ms = 30'000};
+        return {.id = id, .lat = at.lat, .lon = at.lon, .sigma = 3, .sigma_v = 1, .utc = now()};
     }
     static geo::plane_position aim(const strike::outcome& out) {
         return plane.to_plane({.lat = out.aim_lat, .lon = out.aim_lon});
@@ -81,8 +81,7 @@ BOOST_AUTO_TEST_CASE(what_its_own_sensor_sees_is_fused) {
     const auto target = *std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
         return std::hypot(a.at.east, a.at.north) < std::hypot(b.at.east, b.at.north); // so that it stays on its road
     });
-    auto what = jadc2::test::order_for(target, utc);
-    what.deadline_ms = 30'000;
+    const auto what = jadc2::test::order_for(target, utc);
     const auto out = cles::from_json<strike::outcome>(there.ask("DELEGATE self:strike " + cles::to_json(what)));
     BOOST_TEST(out.plots > 10U);
     BOOST_TEST(out.sigma < 2);

@@ -25,7 +25,8 @@ BOOST_DESCRIBE_STRUCT(settings, (), (marks))
 
 class mark_file {
   public:
-    explicit mark_file(const std::string& path) : file_(::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0600)) {
+    explicit mark_file(const std::string& path)
+        : file_(::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC, 0600)) {
         if (file_ < 0) {
             throw std::runtime_error{"there is no file for marks"};
         }
