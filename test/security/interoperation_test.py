@@ -81,8 +81,10 @@ class Written(Scratch):
         fleet = self.identity("authority/fleet.key").public
         public = self.identity("car1/key").public
         challenge, sig = (self.folder / "car1/request").read_text(encoding="ascii").splitlines()
-        request = r.request_to_sign(fleet, "car1", "car2", challenge, "push", "target/a%20b", '{"x":1}')
-        r.verify(public, request, r.binary(sig, 64))
+        signature, waits_ms = r.request_signature(sig)
+        self.assertEqual(waits_ms, 4900)
+        request = r.request_to_sign(fleet, "car1", "car2", challenge, "push", "target/a%20b", '{"x":1}', waits_ms)
+        r.verify(public, request, signature)
         update = r.update_to_sign(fleet, "car1", "localization", 18, "0000002a", "{}")
         r.verify(public, update, r.binary(self.line("car1/update"), 64))
 

@@ -50,11 +50,18 @@ update = 'UPDATE car2:localization seq=17 epoch=5f3a09c1 {"utc":2}'
 announced = ('{"node":"car2","endpoints":["tls://10.0.0.3:25370"],"interval_ms":1000,"tasks":"85944171f73967e8",'
              '"signed":["localization"],"roster":7}')
 challenge = r.text(seed("challenge of car1")[:16])
-request = ("car1", "car2", r.text(seed("challenge")[:16]), "delegate", "strike/now", '{"track":3}')
+request = ("car1", "car2", r.text(seed("challenge")[:16]), "delegate", "strike/now", '{"track":3}', 4900)
 
 
 def signed_update(noun: str, seq: int, body: str) -> str:
     return r.text(car2.sign(r.update_to_sign(fleet.public, "car2", noun, seq, "5f3a09c1", body)))
+
+
+def signed_request(following: bytes) -> dict:
+    signature = car1.sign(r.request_to_sign(fleet.public, *request, following))
+    return {"requester": "car1", "node": "car2", "challenge": request[2], "verb": "DELEGATE", "noun": "strike/now",
+            "body": request[5], "waits_ms": request[6], "bytes": following.decode(),
+            "sig": f"{r.text(signature)}.{request[6]}"}
 
 
 vectors = {
@@ -80,9 +87,8 @@ vectors = {
                                    pool_message.encode()).hex()},
     "ask": {"from": "car1", "version": 7, "message": r.ask(1, 7).hex()},
     "given_roster": {"from": "car2", "to": "car1", "message": r.give_roster(3, car1.public, roster).hex()},
-    "signed_request": {"requester": "car1", "node": "car2", "challenge": request[2], "verb": "DELEGATE",
-                       "noun": "strike/now", "body": request[5],
-                       "sig": r.text(car1.sign(r.request_to_sign(fleet.public, *request)))},
+    "signed_request": signed_request(b""),
+    "signed_request_with_bytes": signed_request(b"hello"),
     "signed_update": {"publisher": "car2", "noun": "localization", "seq": 17, "epoch": "5f3a09c1", "body": '{"utc":2}',
                       "sig": signed_update("localization", 17, '{"utc":2}')},
     "announced": {"node": "car2", "announced": announced, "seq": 18, "epoch": "5f3a09c1", "challenge": challenge,

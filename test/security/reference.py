@@ -172,22 +172,43 @@ def group_keys(sealed: str, receiver: Identity) -> tuple[bytes, bytes]:
 CHALLENGE = 16
 
 
+LONGEST_WAIT = 86_400_000
+
+
 def to_sign(kind: str, fleet: bytes, *lines: str) -> bytes:
-    """No line contains a line end, so that a text has one reading."""
+    """`kind` includes the version. No line contains a line end, so that a text has one reading."""
     if any("\n" in line for line in lines):
         raise Refused("a line end")
-    return "".join(line + "\n" for line in (f"cles {kind} 1", text(fleet), *lines)).encode()
+    return "".join(line + "\n" for line in (f"cles {kind}", text(fleet), *lines)).encode()
 
 
-def request_to_sign(fleet: bytes, requester: str, node: str, challenge: str, verb: str, noun: str, body: str) -> bytes:
+def request_to_sign(fleet: bytes, requester: str, node: str, challenge: str, verb: str, noun: str, body: str,
+                    waits_ms: int, following: bytes = b"") -> bytes:
+    """`waits_ms` is how long the requester goes on waiting, `following` what follows the line."""
     if not NAME.fullmatch(node):
         raise Refused("not a name")
     binary(challenge, CHALLENGE)
-    return to_sign("request", fleet, requester, node, challenge, f"{verb.upper()} {noun}", body or "{}")
+    digest = hashlib.sha256(following).hexdigest() if following else ""
+    return to_sign("request 2", fleet, requester, node, challenge, f"{verb.upper()} {noun}", body or "{}",
+                   str(waits_ms), digest)
+
+
+def request_signature(sig: str) -> tuple[bytes, int]:
+    """The signature in `sig=` of a request, and how long the requester goes on waiting."""
+    signature, dot, waits = sig.partition(".")
+    if not re.fullmatch("[1-9][0-9]{0,7}", waits) or int(waits) > LONGEST_WAIT:
+        raise Refused("not <signature>.<ms>")
+    return binary(signature, 64), int(waits)
+
+
+def may_run(waits_ms: int, verb: str, first_deadline_ms: int, since_challenge_ms: int) -> bool:
+    """Whether the executing node still accepts the signed request, that long after it has issued the challenge."""
+    default = 30_000 if verb.upper() == "DELEGATE" else 5_000
+    return since_challenge_ms < min(waits_ms, first_deadline_ms, default)
 
 
 def update_to_sign(fleet: bytes, publisher: str, noun: str, seq: int, epoch: str, body: str) -> bytes:
-    return to_sign("update", fleet, publisher, noun, f"{seq} {epoch}", body)
+    return to_sign("update 1", fleet, publisher, noun, f"{seq} {epoch}", body)
 
 
 def verify_announced(fleet: bytes, publisher: str, public: bytes, announced: str, entry: dict, challenge: str = "") -> None:

@@ -344,11 +344,19 @@ class Datagrams(unittest.TestCase):
 
 class Signatures(unittest.TestCase):
     def request(self) -> list:
-        return [VECTORS["signed_request"][key] for key in ("requester", "node", "challenge", "verb", "noun", "body")]
+        keys = ("requester", "node", "challenge", "verb", "noun", "body", "waits_ms")
+        return [VECTORS["signed_request"][key] for key in keys]
 
     def test_requests_and_updates(self):
         request, update = VECTORS["signed_request"], VECTORS["signed_update"]
-        r.verify(CAR1.public, r.request_to_sign(FLEET.public, *self.request()), r.binary(request["sig"], 64))
+        for vector in (request, VECTORS["signed_request_with_bytes"]):
+            signature, waits_ms = r.request_signature(vector["sig"])
+            self.assertEqual(waits_ms, vector["waits_ms"])
+            message = r.request_to_sign(FLEET.public, *self.request(), vector["bytes"].encode())
+            r.verify(CAR1.public, message, signature)
+        self.assertEqual(r.request_to_sign(FLEET.public, *self.request()),
+                         b"cles request 2\noJEJNdAl7UcDSSx801tdfCDUe3RHajFnIbjhvyFte54\ncar1\ncar2\n"
+                         b'RfCf_afVdf9dWuK7AU_gmg\nDELEGATE strike/now\n{"track":3}\n4900\n\n')
         r.verify(CAR2.public, r.update_to_sign(FLEET.public, *(update[key] for key in
                  ("publisher", "noun", "seq", "epoch", "body"))), r.binary(update["sig"], 64))
 
@@ -373,14 +381,30 @@ class Signatures(unittest.TestCase):
                                {"seq": 1, "epoch": "5f3a09c1", "sig": r.text(CAR2.sign(message))})
 
     def test_each_part_of_a_request_is_signed(self):
-        parts, signature = self.request(), r.binary(VECTORS["signed_request"]["sig"], 64)
-        others = ("car3", "car3", "A" * 22, "push", "strike", '{"track":4}')
+        parts, (signature, _) = self.request(), r.request_signature(VECTORS["signed_request"]["sig"])
+        others = ("car3", "car3", "A" * 22, "push", "strike", '{"track":4}', 4901, b"hello")
         for place, other in enumerate(others):
-            changed = [other if number == place else part for number, part in enumerate(parts)]
+            changed = [other if number == place else part for number, part in enumerate([*parts, b""])]
             with self.assertRaises(r.Refused):
                 r.verify(CAR1.public, r.request_to_sign(FLEET.public, *changed), signature)
         with self.assertRaises(r.Refused):
             r.verify(CAR1.public, r.request_to_sign(CAR2.public, *parts), signature)
+
+    def test_a_request_states_how_long_its_requester_waits(self):
+        signature = VECTORS["signed_request"]["sig"].partition(".")[0]
+        for wrong in ("", ".", ".0", ".01", ".-1", ".86400001", ".1.1", ".x", ".1 "):
+            with self.assertRaises(r.Refused, msg=wrong):
+                r.request_signature(signature + wrong)
+        self.assertEqual(r.request_signature(signature + ".86400000")[1], 86_400_000)
+
+    def test_it_runs_only_as_long_as_its_requester_waits(self):
+        day = 86_400_000
+        for waits, verb, first, since, expected in (
+            (4900, "DELEGATE", 5000, 4899, True), (4900, "DELEGATE", 5000, 4900, False),
+            (4900, "DELEGATE", 1000, 1000, False), (day, "DELEGATE", day, 29_999, True),
+            (day, "DELEGATE", day, 30_000, False), (day, "PULL", day, 4999, True), (day, "pull", day, 5000, False),
+        ):
+            self.assertEqual(r.may_run(waits, verb, first, since), expected, (waits, verb, first, since))
 
     def test_what_a_node_demands_is_checked_before_it_is_signed(self):
         for place, wrong in ((1, ""), (1, "car 2"), (1, "car2\nx"), (2, ""), (2, "A" * 21), (2, "A" * 21 + "B"),
@@ -393,7 +417,7 @@ class Signatures(unittest.TestCase):
     def test_one_kind_of_signature_is_not_another(self):
         update = VECTORS["signed_update"]
         message = r.update_to_sign(FLEET.public, "car2", "localization", 17, "5f3a09c1", '{"utc":2}')
-        for start in (b"cles request 1\n", b"cles roster 1\n"):
+        for start in (b"cles request 2\n", b"cles roster 1\n"):
             with self.assertRaises(r.Refused):
                 r.verify(CAR2.public, start + message.split(b"\n", 1)[1], r.binary(update["sig"], 64))
 

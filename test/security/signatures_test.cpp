@@ -32,7 +32,15 @@ signed_request request_of(const vector_texts& texts) {
             .challenge = texts.at("challenge"),
             .kind = *cles::verb_from(texts.at("verb")),
             .noun = texts.at("noun"),
-            .body = texts.at("body")};
+            .body = texts.at("body"),
+            .waits_ms = boost::json::value_to<std::uint32_t>(texts.all.at("waits_ms")),
+            .bytes = texts.at("bytes")};
+}
+
+// The vectors have the value of `sig=`.
+std::string_view signature_in(const vector_texts& texts) {
+    const auto sig = texts.at("sig");
+    return sig.substr(0, sig.find('.'));
 }
 
 signed_update update_of(const vector_texts& texts) {
@@ -51,12 +59,21 @@ BOOST_AUTO_TEST_CASE(the_request_of_the_vectors_holds) {
     const vector_texts texts{"signed_request"};
     const auto request = request_of(texts);
     BOOST_TEST(text_to_sign(fleet_key(), request) ==
-               "cles request 1\noJEJNdAl7UcDSSx801tdfCDUe3RHajFnIbjhvyFte54\ncar1\ncar2\nRfCf_afVdf9dWuK7AU_gmg\n"
-               "DELEGATE strike/now\n{\"track\":3}\n");
-    BOOST_TEST(sign(vector_key("car1"), fleet_key(), request) == texts.at("sig"));
-    BOOST_TEST(verify(vector_key("car1").public_part(), fleet_key(), request, texts.at("sig")));
-    BOOST_TEST(!verify(vector_key("car2").public_part(), fleet_key(), request, texts.at("sig")));
-    BOOST_TEST(!verify(vector_key("car1").public_part(), vector_key("car2").public_part(), request, texts.at("sig")));
+               "cles request 2\noJEJNdAl7UcDSSx801tdfCDUe3RHajFnIbjhvyFte54\ncar1\ncar2\nRfCf_afVdf9dWuK7AU_gmg\n"
+               "DELEGATE strike/now\n{\"track\":3}\n4900\n\n");
+    BOOST_TEST(sign(vector_key("car1"), fleet_key(), request) + ".4900" == texts.at("sig"));
+    const auto sig = signature_in(texts);
+    BOOST_TEST(verify(vector_key("car1").public_part(), fleet_key(), request, sig));
+    BOOST_TEST(!verify(vector_key("car2").public_part(), fleet_key(), request, sig));
+    BOOST_TEST(!verify(vector_key("car1").public_part(), vector_key("car2").public_part(), request, sig));
+}
+
+BOOST_AUTO_TEST_CASE(bytes_that_follow_a_request_are_signed) {
+    const vector_texts texts{"signed_request_with_bytes"};
+    const auto request = request_of(texts);
+    BOOST_TEST(text_to_sign(fleet_key(), request)
+                   .ends_with("\n4900\n2cf24dba5fb0a30e26e83b2ac5b9e29e1b161e5c1fa7425e73043362938b9824\n"));
+    BOOST_TEST(sign(vector_key("car1"), fleet_key(), request) == signature_in(texts));
 }
 
 BOOST_AUTO_TEST_CASE(the_update_of_the_vectors_holds) {
@@ -89,15 +106,17 @@ BOOST_AUTO_TEST_CASE(the_announcements_of_the_vectors_hold) {
 
 BOOST_AUTO_TEST_CASE(each_part_of_a_request_is_signed) {
     const vector_texts texts{"signed_request"};
-    std::vector<signed_request> others(6, request_of(texts));
+    std::vector<signed_request> others(8, request_of(texts));
     others[0].requester = "car3";
     others[1].node = "car3";
     others[2].challenge = "AAAAAAAAAAAAAAAAAAAAAA";
     others[3].kind = cles::verb::push;
     others[4].noun = "strike";
     others[5].body = "{\"track\":4}";
+    others[6].waits_ms = 4901;
+    others[7].bytes = "hello";
     for (const auto& other : others) {
-        BOOST_TEST(!verify(vector_key("car1").public_part(), fleet_key(), other, texts.at("sig")));
+        BOOST_TEST(!verify(vector_key("car1").public_part(), fleet_key(), other, signature_in(texts)));
     }
 }
 
@@ -149,7 +168,7 @@ BOOST_AUTO_TEST_CASE(a_text_has_one_reading) {
     wrong = good;
     wrong.requester = "car1\n";
     BOOST_TEST(refused(wrong) == "what is signed contains a line end");
-    BOOST_TEST(!verify(vector_key("car1").public_part(), fleet_key(), wrong, texts.at("sig")));
+    BOOST_TEST(!verify(vector_key("car1").public_part(), fleet_key(), wrong, signature_in(texts)));
     for (const auto& update : {signed_update{.publisher = "a\n"}, signed_update{.noun = "b\n"},
                                signed_update{.epoch = "c\n"}, signed_update{.body = "{\n}"}}) {
         BOOST_TEST(refused(update) == "what is signed contains a line end");
@@ -162,7 +181,7 @@ BOOST_AUTO_TEST_CASE(one_kind_of_signature_is_not_another) {
     signature made{};
     BOOST_REQUIRE(read_base64url(texts.at("sig"), made));
     BOOST_TEST(verify(vector_key("car2").public_part(), text, made));
-    for (const std::string_view start : {"cles request 1\n", "cles roster 1\n"}) {
+    for (const std::string_view start : {"cles request 2\n", "cles roster 1\n"}) {
         BOOST_TEST(!verify(vector_key("car2").public_part(), replaced(text, "cles update 1\n", start), made));
     }
 }

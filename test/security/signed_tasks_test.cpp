@@ -121,6 +121,7 @@ struct fixture {
         fleet.add("sat1", {.forwards = {"*"}});
         fleet.add("sat2");
     }
+    /// The value of `sig=`, of a requester that waits for a while.
     [[nodiscard]] std::string signature(const std::string& by, const std::string& challenge,
                                         const std::string& body) const {
         const auto own = cles::security::key_directory{fleet.directory_of(by)}.read_node();
@@ -130,7 +131,9 @@ struct fixture {
                                                                    .challenge = challenge,
                                                                    .kind = cles::verb::delegate,
                                                                    .noun = "strike",
-                                                                   .body = body});
+                                                                   .body = body,
+                                                                   .waits_ms = 30'000}) +
+               ".30000";
     }
 
     boost::asio::io_context io;
@@ -278,6 +281,16 @@ BOOST_AUTO_TEST_CASE(a_wrong_signature_runs_nothing) {
         return member->ask("DELEGATE car1:strike id=7 sig=" + sig + " " + order);
     };
     BOOST_TEST(contains(of(signature("sat1", challenge, order)), "denied"));
+    BOOST_TEST(armed.runs() == 0U);
+    member->close();
+}
+
+BOOST_AUTO_TEST_CASE(a_forwarder_cannot_prolong_it) {
+    const auto member = raw_member::connect(io, fleet, "car2", car1);
+    const auto challenge = text_after(member->ask("DELEGATE car1:strike id=7 " + order), "\"challenge\":\"");
+    auto sig = signature("car2", challenge, order);
+    sig += "0";
+    BOOST_TEST(contains(member->ask("DELEGATE car1:strike id=7 sig=" + sig + " " + order), "denied"));
     BOOST_TEST(armed.runs() == 0U);
     member->close();
 }

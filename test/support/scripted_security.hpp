@@ -38,22 +38,24 @@ class scripted_security final : public core::node_security {
         return challenge.empty() ? "challenge" + std::to_string(++challenges) : challenge;
     }
     [[nodiscard]] std::string sign_request(std::string_view node, std::string_view challenge, verb how,
-                                           std::string_view path, std::string_view body) const override {
-        return challenge.starts_with("challenge") ? request_signature(self, node, challenge, how, path, body)
+                                           std::string_view path, std::string_view body,
+                                           std::uint32_t waits_ms) const override {
+        return challenge.starts_with("challenge") ? request_signature(self, node, challenge, how, path, body, waits_ms)
                                                   : std::string{};
     }
     [[nodiscard]] bool is_request_signed(std::string_view requester, std::string_view challenge, verb how,
                                          std::string_view path, std::string_view body,
-                                         std::string_view sig) const override {
-        return sig == request_signature(requester, self, challenge, how, path, body);
+                                         const protocol::request_signature& sig) const override {
+        return sig.signature == request_signature(requester, self, challenge, how, path, body, sig.waits_ms);
     }
     static std::string request_signature(std::string_view requester, std::string_view node, std::string_view challenge,
-                                         verb how, std::string_view path, std::string_view body) {
+                                         verb how, std::string_view path, std::string_view body,
+                                         std::uint32_t waits_ms) {
         std::string all;
         for (const auto part : {requester, node, challenge, to_string(how), path, body}) {
             all.append(part).push_back('-');
         }
-        return std::to_string(std::hash<std::string>{}(all));
+        return std::to_string(std::hash<std::string>{}(all + std::to_string(waits_ms)));
     }
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override {
         return port;

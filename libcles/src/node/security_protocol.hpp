@@ -96,10 +96,11 @@ class security_protocol {
 
     // -- requests of others
 
-    /// Why a request for a signed task may not run. Nothing if it may run, once. `link` is the identity of the peer, of
-    /// which each link has its own.
+    /// Why a request for a signed task may not run. Nothing if it may run, once: then `due` becomes the time until
+    /// which its requester has signed to wait, if that is earlier. `link` is the identity of the peer, of which each
+    /// link has its own.
     [[nodiscard]] virtual std::optional<protocol::failure>
-    refusal(const identity& link, const protocol::request_line& request, time_point due, time_point now) = 0;
+    refusal(const identity& link, const protocol::request_line& request, time_point& due, time_point now) = 0;
     /// The link is gone.
     virtual void forget(const identity& link) noexcept = 0;
     /// Serves a request for the reserved task `cles`. Returns false if only the plain protocol may have it.

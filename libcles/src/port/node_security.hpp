@@ -9,6 +9,7 @@
 #include "port/group_port.hpp"
 #include "port/message_seal.hpp"
 #include "protocol/grammar.hpp"
+#include "protocol/request_line.hpp"
 
 #include <cstdint>
 #include <memory>
@@ -74,13 +75,15 @@ class node_security {
                                          std::string_view epoch, std::string_view body, std::string_view sig) const = 0;
     /// A challenge for a requester to sign.
     [[nodiscard]] virtual std::string new_challenge() const = 0;
-    /// The signature of a request of this node, executed by `node`. Empty if that is not a challenge that nodes write.
+    /// The signature of a request of this node, executed by `node`, for which it waits as long as stated. Empty if that
+    /// is not a challenge that nodes write.
     [[nodiscard]] virtual std::string sign_request(std::string_view node, std::string_view challenge, verb how,
-                                                   std::string_view path, std::string_view body) const = 0;
-    /// Whether `sig` is the signature of a request that this node executes.
+                                                   std::string_view path, std::string_view body,
+                                                   std::uint32_t waits_ms) const = 0;
+    /// Whether `sig` is the signature of a request that this node executes, with the time that it states.
     [[nodiscard]] virtual bool is_request_signed(std::string_view requester, std::string_view challenge, verb how,
                                                  std::string_view path, std::string_view body,
-                                                 std::string_view sig) const = 0;
+                                                 const protocol::request_signature& sig) const = 0;
     /// A port that seals what it sends with that one, and delivers what it can open, with its sender.
     [[nodiscard]] virtual std::shared_ptr<group_port> seal(std::shared_ptr<group_port> port) = 0;
 

@@ -343,6 +343,17 @@ void append_update_head(std::string& out, std::string_view publisher, std::strin
     out.append(" epoch=").append(epoch).push_back(' ');
 }
 
+std::optional<request_signature> parse_request_signature(std::string_view sig) noexcept {
+    const auto dot = std::min(sig.find('.'), sig.size());
+    request_signature read{.signature = sig.substr(0, dot)};
+    const auto time = sig.substr(std::min(dot + 1, sig.size()));
+    return take(read.waits_ms, number_between(time, 1, max_deadline_ms)) ? std::optional{read} : std::nullopt;
+}
+
+std::string request_signature_text(const request_signature& sig) {
+    return std::string{sig.signature}.append(".").append(std::to_string(sig.waits_ms));
+}
+
 std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept { return parse_hex<std::uint32_t>(text); }
 
 std::optional<std::uint64_t> parse_grant(std::string_view text) noexcept {

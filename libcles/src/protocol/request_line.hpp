@@ -69,7 +69,7 @@ struct request_line : carried_adverbs {
     std::optional<std::uint32_t> epoch;
     std::string_view via;
     std::string_view from;  ///< the requester, if the peer forwards
-    std::string_view sig;   ///< the signature of the requester, or of an update's publisher
+    std::string_view sig;   ///< what the requester has signed it with, or an update's publisher
     std::string_view since; ///< what the requester knows already
     routes_question routes{};
     std::uint64_t grant = 0;                   ///< of slots, or on which a job is forwarded; 0: none
@@ -167,6 +167,15 @@ constexpr std::string_view last_in_via(std::string_view via) noexcept {
     const auto comma = via.rfind(',');
     return comma == std::string_view::npos ? via : via.substr(comma + 1);
 }
+
+/// The value of `sig=` on a request that is not an update: `<signature>.<ms>`.
+struct request_signature {
+    std::string_view signature{};
+    std::uint32_t waits_ms = 0; ///< how long the requester goes on waiting, when it signs
+};
+/// Nothing if the text has another form, such as that of version 1, which has no time.
+std::optional<request_signature> parse_request_signature(std::string_view sig) noexcept;
+std::string request_signature_text(const request_signature& sig);
 
 /// Eight lower-case hex digits: parsing and formatting.
 std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept;

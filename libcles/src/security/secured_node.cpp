@@ -138,12 +138,16 @@ bool secured_node::is_signed(std::string_view publisher, std::string_view path, 
 std::string secured_node::new_challenge() const { return security::new_challenge(); }
 
 std::string secured_node::sign_request(std::string_view node, std::string_view challenge, verb how,
-                                       std::string_view path, std::string_view body) const {
+                                       std::string_view path, std::string_view body, std::uint32_t waits_ms) const {
     try {
-        return sign(
-            fleet_->own_key(), fleet_->in_force().fleet(),
-            signed_request{
-                .requester = name(), .node = node, .challenge = challenge, .kind = how, .noun = path, .body = body});
+        return sign(fleet_->own_key(), fleet_->in_force().fleet(),
+                    signed_request{.requester = name(),
+                                   .node = node,
+                                   .challenge = challenge,
+                                   .kind = how,
+                                   .noun = path,
+                                   .body = body,
+                                   .waits_ms = waits_ms});
     } catch (const security_error& e) {
         log(log_level::warning, std::string{"a request was not signed: "} + e.what());
         return {};
@@ -151,7 +155,8 @@ std::string secured_node::sign_request(std::string_view node, std::string_view c
 }
 
 bool secured_node::is_request_signed(std::string_view requester, std::string_view challenge, verb how,
-                                     std::string_view path, std::string_view body, std::string_view sig) const {
+                                     std::string_view path, std::string_view body,
+                                     const protocol::request_signature& sig) const {
     const auto* const who = fleet_->in_force().find(requester);
     return who != nullptr && verify(who->key, fleet_->in_force().fleet(),
                                     signed_request{.requester = requester,
@@ -159,8 +164,9 @@ bool secured_node::is_request_signed(std::string_view requester, std::string_vie
                                                    .challenge = challenge,
                                                    .kind = how,
                                                    .noun = path,
-                                                   .body = body},
-                                    sig);
+                                                   .body = body,
+                                                   .waits_ms = sig.waits_ms},
+                                    sig.signature);
 }
 
 std::shared_ptr<core::group_port> secured_node::seal(std::shared_ptr<core::group_port> port) {

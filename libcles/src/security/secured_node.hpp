@@ -58,10 +58,11 @@ class secured_node : public core::node_security {
                                  std::string_view epoch, std::string_view body, std::string_view sig) const override;
     [[nodiscard]] std::string new_challenge() const override;
     [[nodiscard]] std::string sign_request(std::string_view node, std::string_view challenge, verb how,
-                                           std::string_view path, std::string_view body) const override;
+                                           std::string_view path, std::string_view body,
+                                           std::uint32_t waits_ms) const override;
     [[nodiscard]] bool is_request_signed(std::string_view requester, std::string_view challenge, verb how,
                                          std::string_view path, std::string_view body,
-                                         std::string_view sig) const override;
+                                         const protocol::request_signature& sig) const override;
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override;
     [[nodiscard]] std::unique_ptr<core::message_seal> seal_messages() override;
     [[nodiscard]] std::uint64_t unsealed_datagrams() const override { return datagrams_->unsealed(); }

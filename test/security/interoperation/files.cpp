@@ -36,9 +36,10 @@ void write_signatures(const key_directory& files, const signing_key& key, const 
                                  .challenge = challenge,
                                  .kind = cles::verb::push,
                                  .noun = "target/a%20b",
-                                 .body = "{\"x\":1}"};
+                                 .body = "{\"x\":1}",
+                                 .waits_ms = 4900};
     const signed_update update{.publisher = "car1", .noun = "localization", .seq = 18, .epoch = "0000002a", .body = ""};
-    write_text_file(files, "request", challenge + "\n" + sign(key, fleet, request) + "\n");
+    write_text_file(files, "request", challenge + "\n" + sign(key, fleet, request) + ".4900\n");
     write_text_file(files, "update", sign(key, fleet, update) + "\n");
 }
 

@@ -429,4 +429,18 @@ BOOST_AUTO_TEST_CASE(an_epoch_is_8_lower_case_hex_digits) {
 
 BOOST_AUTO_TEST_SUITE_END()
 
+BOOST_AUTO_TEST_CASE(a_signature_of_a_request_states_how_long_its_requester_waits) {
+    const auto read = cles::protocol::parse_request_signature("abc-_.30000");
+    BOOST_REQUIRE(read);
+    BOOST_TEST(read->signature == "abc-_");
+    BOOST_TEST(read->waits_ms == 30'000U);
+    BOOST_TEST(cles::protocol::request_signature_text(*read) == "abc-_.30000");
+    BOOST_TEST(cles::protocol::parse_request_signature("abc.1").has_value());
+    BOOST_TEST(cles::protocol::parse_request_signature("abc.86400000").has_value());
+    for (const std::string_view other : {"", "abc", ".", "abc.", "abc.0", "abc.01", "abc.86400001", "abc.1.2", "abc.-1",
+                                         "abc.x", "abc.99999999999999999999"}) {
+        BOOST_TEST(!cles::protocol::parse_request_signature(other), other);
+    }
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -19,7 +19,8 @@ namespace cles::core {
 struct node_state;
 
 /// The challenges that this node has given to requesters of signed tasks (docs/security.md, "Signed requests"). Each is
-/// valid once, for the same request, until its first attempt's deadline or the end of the link on which it was given.
+/// valid once, for the same request, until its first attempt's deadline, but no longer than requests of its verb
+/// usually wait, or until the end of the link on which it was given.
 class request_challenges {
   public:
     /// Beyond these, the oldest one is forgotten.
@@ -30,10 +31,10 @@ class request_challenges {
     explicit request_challenges(const node_state& host) noexcept : node_(host) {}
 
     /// Why a request for a signed task may not run: it has no signature, and the failure contains a challenge, or its
-    /// signature is not valid. Nothing if it may run, once. `link` is the identity of the peer, of which each link has
-    /// its own.
+    /// signature is not valid. Nothing if it may run, once: then `due` becomes the time until which its requester has
+    /// signed to wait, if that is earlier. `link` is the identity of the peer, of which each link has its own.
     [[nodiscard]] std::optional<protocol::failure> refusal(const identity& link, const protocol::request_line& request,
-                                                           time_point due, time_point now);
+                                                           time_point& due, time_point now);
     /// The link is gone.
     void forget(const identity& link) noexcept;
     [[nodiscard]] std::size_t size() const noexcept { return given_.size(); }
@@ -52,10 +53,12 @@ class request_challenges {
     struct given {
         request_key what;
         std::string challenge;
+        time_point issued;
         time_point due;
     };
 
     [[nodiscard]] request_key key_of(const identity& link, const protocol::request_line& request) const;
+    [[nodiscard]] protocol::failure not_accepted(std::string_view task, std::string_view why) const;
     [[nodiscard]] protocol::failure challenge(request_key what, std::string_view task, time_point due, time_point now);
     void make_space(const identity* link, time_point now);
 

@@ -9,7 +9,11 @@
 #include "protocol/line.hpp"
 #include "protocol/reply_line.hpp"
 
+#include <algorithm>
+#include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -52,13 +56,20 @@ bool may_sign_for(local_node& host, const repeatable_request& r, const std::stri
 }
 
 // Where a node is reached that a request for `target` has led to: in the pool that was named, since its name alone may
+// How long this node goes on waiting. At least 1 ms, which requests state at least.
+std::uint32_t waits_ms(const repeatable_request& r, time_point now) {
+    const auto left = std::chrono::floor<std::chrono::milliseconds>(r.deadline - now).count();
+    return static_cast<std::uint32_t>(std::clamp<std::int64_t>(left, 1, std::int64_t{protocol::max_deadline_ms}));
+}
+
 // not be known here.
 std::string address_in_pool(local_node& host, const std::string& target, const std::string& node) {
     const auto member = member_of(host.node(), target);
     return protocol::is_reserved_target(member) ? target.substr(0, target.size() - member.size()) + node : target;
 }
 
-/// The node that has asked for a signature with this failure, if it may get one; else nothing. `sig` is the signature.
+/// The node that has asked for a signature with this failure, if it may get one; else nothing. `sig` is the value of
+/// `sig=`.
 std::optional<std::string> signing_node(local_node& host, const repeatable_request& r, std::string_view answer,
                                         std::string& sig) {
     protocol::failure why;
@@ -73,9 +84,11 @@ std::optional<std::string> signing_node(local_node& host, const repeatable_reque
         return {};
     }
     std::string scratch;
-    sig = host.node().security->sign_request(why.node, why.challenge, r.how, protocol::canonical_path(noun, scratch),
-                                             r.body);
-    return sig.empty() ? std::nullopt : std::optional{std::move(why.node)};
+    const auto waits = waits_ms(r, host.node().time.now());
+    const auto made = host.node().security->sign_request(why.node, why.challenge, r.how,
+                                                         protocol::canonical_path(noun, scratch), r.body, waits);
+    sig = protocol::request_signature_text({.signature = made, .waits_ms = waits});
+    return made.empty() ? std::nullopt : std::optional{std::move(why.node)};
 }
 
 void send_signed(local_node& host, request_signer& by, const repeatable_request& r, const std::string& node,

@@ -52,7 +52,7 @@ detail::pending_ptr secured_protocol::watch(const outgoing_call& request, detail
 bool secured_protocol::cancel(std::uint64_t ticket) { return signer_ && signer_->cancel(ticket); }
 
 std::optional<protocol::failure> secured_protocol::refusal(const identity& link, const protocol::request_line& request,
-                                                           time_point due, time_point now) {
+                                                           time_point& due, time_point now) {
     return challenges_.refusal(link, request, due, now);
 }
 

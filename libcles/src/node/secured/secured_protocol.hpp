@@ -28,7 +28,7 @@ class secured_protocol final : public security_protocol {
     detail::pending_ptr watch(const outgoing_call& request, detail::pending_ptr operation) override;
     bool cancel(std::uint64_t ticket) override;
     std::optional<protocol::failure> refusal(const identity& link, const protocol::request_line& request,
-                                             time_point due, time_point now) override;
+                                             time_point& due, time_point now) override;
     void forget(const identity& link) noexcept override { challenges_.forget(link); }
     bool serve_reserved(reply_writer& replies, const protocol::request_line& request) override;
     std::optional<bool> must_be_signed(std::string_view publisher, std::string_view task) const override;

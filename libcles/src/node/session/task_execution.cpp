@@ -207,7 +207,9 @@ std::optional<protocol::failure> task_execution::signature_refusal() {
                                  .message = node_->name + ": '" + std::string{line_.noun.task} +
                                             "' requires signed requests, and this node has no security"};
     }
-    return node_->secured->refusal(*data_.peer, line_, due_, now_);
+    auto why = node_->secured->refusal(*data_.peer, line_, due_, now_);
+    data_.deadline = due_;
+    return why;
 }
 
 void task_execution::write(json_writer& w) {

@@ -140,12 +140,12 @@ class task_execution {
 
     const std::shared_ptr<node_state>& node_;
     const protocol::request_line& line_;
-    const time_point due_;
+    time_point due_;
     const time_point now_;
     const handler* handler_; // null: not found
     decoded_parameters parameters_;
     const std::string trace_; // empty: none
-    const detail::request_data data_;
+    detail::request_data data_;
     const request request_;
     std::string path_;
     bool started_ = false;

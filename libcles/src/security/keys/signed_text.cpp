@@ -7,6 +7,8 @@
 #include <array>
 #include <initializer_list>
 
+#include <sodium.h>
+
 namespace cles::security {
 namespace {
 
@@ -23,6 +25,17 @@ std::string join_lines(std::initializer_list<std::string_view> lines) {
         text.append(line).push_back('\n');
     }
     return text;
+}
+
+// The SHA-256 in hex; empty without bytes.
+std::string digest_line(std::string_view bytes) {
+    if (bytes.empty()) {
+        return {};
+    }
+    std::array<std::uint8_t, crypto_hash_sha256_BYTES> digest{};
+    crypto_hash_sha256(digest.data(), as_bytes(bytes).data(), bytes.size());
+    std::array<char, 2 * digest.size() + 1> text{}; // with its end
+    return sodium_bin2hex(text.data(), text.size(), digest.data(), digest.size());
 }
 
 std::string_view body_or_default(std::string_view body) { return body.empty() ? std::string_view{"{}"} : body; }
@@ -52,8 +65,9 @@ std::string text_to_sign(const public_key& fleet, const signed_request& request)
         throw security_error{"what is signed contains a line end"};
     }
     const auto action = std::string{to_string(request.kind)}.append(" ").append(request.noun);
-    return join_lines({"cles request 1", to_base64url(fleet), request.requester, request.node, request.challenge,
-                       action, body_or_default(request.body)});
+    return join_lines({"cles request 2", to_base64url(fleet), request.requester, request.node, request.challenge,
+                       action, body_or_default(request.body), std::to_string(request.waits_ms),
+                       digest_line(request.bytes)});
 }
 
 std::string text_to_sign(const public_key& fleet, const signed_update& update) {

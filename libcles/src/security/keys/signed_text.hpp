@@ -18,8 +18,10 @@ struct signed_request {
     std::string_view node{};      ///< the name of the executing node
     std::string_view challenge{}; ///< as that node wrote it
     verb kind = verb::pull;
-    std::string_view noun{}; ///< task and parameters as nodes write them
-    std::string_view body{}; ///< as sent; may be empty
+    std::string_view noun{};    ///< task and parameters as nodes write them
+    std::string_view body{};    ///< as sent; may be empty
+    std::uint32_t waits_ms = 0; ///< how long the requester goes on waiting
+    std::string_view bytes{};   ///< that follow the line; may be empty
 };
 
 struct signed_update {

@@ -11,6 +11,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -27,6 +28,7 @@ namespace {
 using cles::errc;
 using cles::verb;
 using cles::test::scripted_security;
+using namespace std::chrono_literals;
 
 /// A link to a node that forwards, which the test plays.
 class recorded_link final : public cles::link {
@@ -59,7 +61,7 @@ class recorded_link final : public cles::link {
 /// Whatever is dialled is the link.
 class one_link_environment final : public cles::core::environment {
   public:
-    [[nodiscard]] cles::time_point now() const override { return clock_.now(); }
+    [[nodiscard]] cles::time_point now() const override { return clock.now(); }
     std::uint32_t random() override { return ++drawn_; }
     void post(std::shared_ptr<cles::core::task> next) override { tasks_.push_back(std::move(next)); }
     void start_timer(std::function<void()>) override {}
@@ -92,11 +94,11 @@ class one_link_environment final : public cles::core::environment {
     }
 
     std::shared_ptr<recorded_link> link = std::make_shared<recorded_link>();
+    cles::test::manual_clock clock;
 
   private:
     static std::logic_error none() { return std::logic_error{"there is no network"}; }
 
-    cles::test::manual_clock clock_;
     std::uint32_t drawn_ = 0;
     std::deque<std::shared_ptr<cles::core::task>> tasks_;
 };
@@ -136,9 +138,11 @@ struct fixture {
     static std::string denied_by(const std::string& node) {
         return R"({"error":"denied","message":"sign it","node":")" + node + R"(","challenge":"challenge1"})";
     }
-    static std::string signature(const std::string& node) {
+    /// The value of `sig=`.
+    static std::string signature(const std::string& node, std::uint32_t waits_ms = 30'000) {
         return scripted_security::request_signature("car2", node, "challenge1", verb::delegate, "strike/now",
-                                                    "{\"a\":1}");
+                                                    "{\"a\":1}", waits_ms) +
+               "." + std::to_string(waits_ms);
     }
 
     std::shared_ptr<scripted_security> security = std::make_shared<scripted_security>();
@@ -174,6 +178,14 @@ BOOST_AUTO_TEST_CASE(not_for_another_node) {
         const auto result = ask("north.car1:strike/now");
         BOOST_TEST(reply(take(), denied_by(node)).empty(), node);
         BOOST_TEST(result->ended, node);
+BOOST_AUTO_TEST_CASE(it_signs_how_long_it_still_waits) {
+    ask("north.car1:strike/now");
+    const auto first = take();
+    environment->clock.advance(4s + 300us);
+    const auto second = reply(first, denied_by("car1"));
+    BOOST_TEST(second.find(" sig=" + signature("car1", 25'999) + " ") != std::string::npos, second);
+}
+
         BOOST_TEST((result->code == errc::denied), node);
     }
 }

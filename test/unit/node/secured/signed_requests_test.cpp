@@ -5,6 +5,8 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <chrono>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -52,10 +54,16 @@ struct fixture : security_of_fixture, cles::test::routing_fixture {
         return {std::string{cles::wire_name(why.code)}, why.node, why.challenge, why.message};
     }
     told ask(const std::string& line) { return read(link.ask(line)); }
+    /// The value of `sig=`.
     static std::string signature(std::string_view challenge, std::string_view body = "{\"a\":1}",
                                  std::string_view by = "car2", verb how = verb::delegate,
-                                 std::string_view path = "strike/now", std::string_view node = "car1") {
-        return scripted_security::request_signature(by, node, challenge, how, path, body);
+                                 std::string_view path = "strike/now", std::string_view node = "car1",
+                                 std::uint32_t waits_ms = 20'000) {
+        return scripted_security::request_signature(by, node, challenge, how, path, body, waits_ms) + "." +
+               std::to_string(waits_ms);
+    }
+    static std::string waiting(std::string_view challenge, std::uint32_t waits_ms) {
+        return signature(challenge, "{\"a\":1}", "car2", verb::delegate, "strike/now", "car1", waits_ms);
     }
     const std::string first = "DELEGATE car1:strike/now id=7 {\"a\":1}";
     static std::string second(const std::string& sig) {
@@ -139,6 +147,82 @@ BOOST_AUTO_TEST_CASE(it_is_valid_until_the_first_attempts_deadline) {
     node.pass(1000ms);
     BOOST_TEST(ask(second(signature(late.challenge))).error == "denied");
     BOOST_TEST(runs == 1);
+}
+
+BOOST_AUTO_TEST_CASE(it_is_valid_no_longer_than_the_verbs_default_deadline) {
+    const auto attempt = std::string{"DELEGATE car1:strike/now id=7 deadline=86400000 {\"a\":1}"};
+    const auto early = ask(attempt);
+    node.pass(29'999ms);
+    BOOST_TEST(ask(second(waiting(early.challenge, 86'400'000))).error.empty());
+    const auto late = ask(attempt);
+    node.pass(30s);
+    BOOST_TEST(ask(second(waiting(late.challenge, 86'400'000))).error == "denied");
+    const auto pull = ask("PULL car1:strike id=7 deadline=86400000");
+    node.pass(5s);
+    const auto sig = signature(pull.challenge, "", "car2", verb::pull, "strike");
+    BOOST_TEST(ask("PULL car1:strike id=8 sig=" + sig).error == "denied");
+    BOOST_TEST(runs == 1);
+}
+
+// A node that forwards may hold the request and state any deadline.
+BOOST_AUTO_TEST_CASE(it_runs_only_as_long_as_its_requester_waits) {
+    const auto release = [&](std::string_view challenge) {
+        return ask("DELEGATE car1:strike/now id=8 deadline=86400000 sig=" + waiting(challenge, 1'000) + " {\"a\":1}");
+    };
+    const auto early = ask(first);
+    node.pass(999ms);
+    BOOST_TEST(release(early.challenge).error.empty());
+    const auto late = ask(first);
+    node.pass(1'000ms);
+    const auto told = release(late.challenge);
+    BOOST_TEST(told.error == "denied");
+    BOOST_TEST(told.message == "car1 does not accept the signature for 'strike': car2 has stopped waiting");
+    BOOST_TEST(node.secured().challenges().size() == 0U);
+    BOOST_TEST(runs == 1);
+}
+
+BOOST_AUTO_TEST_CASE(one_that_waits_here_ends_with_its_requesters_patience) {
+    std::shared_ptr<cles::core::call> waiting_call;
+    cles::time_point stated{};
+    node.host->tasks.add(verb::delegate, "aim",
+                         {.info = {.must_be_signed = true},
+                          .start = [&](const cles::request& r, const std::shared_ptr<cles::core::call>& c) {
+                              stated = r.deadline();
+                              waiting_call = c;
+                          }});
+    const auto issued = node.clock.now();
+    const auto told = ask("DELEGATE car1:aim id=7");
+    node.pass(400ms);
+    const auto sig = signature(told.challenge, "", "car2", verb::delegate, "aim", "car1", 1'000);
+    BOOST_TEST(link.ask("DELEGATE car1:aim id=8 deadline=86400000 sig=" + sig).empty());
+    BOOST_REQUIRE(waiting_call);
+    BOOST_TEST((stated == issued + 1s));
+    node.pass(599ms);
+    BOOST_TEST(!waiting_call->stopped());
+    node.pass(1ms);
+    BOOST_TEST(waiting_call->stopped());
+    BOOST_TEST(read(link.take()).error == "deadline");
+}
+
+BOOST_AUTO_TEST_CASE(the_time_that_its_requester_waits_is_signed) {
+    const auto given = ask(first);
+    auto sig = waiting(given.challenge, 1'000);
+    sig += "0"; // 10 s
+    BOOST_TEST(ask(second(sig)).error == "denied");
+    BOOST_TEST(runs == 0);
+}
+
+BOOST_AUTO_TEST_CASE(version_1_is_refused_and_told_so) {
+    const auto signature_alone = [](const std::string& sig) { return sig.substr(0, sig.find('.')); };
+    for (const std::string time : {"", ".", ".0", ".01", ".86400001", ".1.1", ".x"}) {
+        const auto told = ask(second(signature_alone(signature(ask(first).challenge)) + time));
+        BOOST_TEST(told.error == "denied", time);
+        BOOST_TEST(told.challenge.empty(), time);
+        BOOST_TEST(told.message == "car1 does not accept the signature for 'strike': it has not the form "
+                                   "<signature>.<ms> of version 2: requester and executing node are upgraded together",
+                   time);
+    }
+    BOOST_TEST(runs == 0);
 }
 
 BOOST_AUTO_TEST_CASE(another_attempt_replaces_it) {
