@@ -29,7 +29,7 @@ class recorded_next_hop final : public core::next_hop {
         core::outbound::progress_function progress{};
 
         /// The node replies.
-        void answers(std::string_view json) { reply.release()->offer(json); }
+        void answers(std::string_view json) { static_cast<void>(reply.release()->offer(json)); }
         void refuses(std::string_view json) {
             protocol::failure why;
             protocol::parse_failure(json, why);

@@ -25,7 +25,7 @@ class recorded_reply final : public detail::pending {
     explicit recorded_reply(std::shared_ptr<outcome> to) : to_(std::move(to)) {}
 
     verdict offer(std::string_view json) override {
-        if (!is_valid_json(json)) {
+        if (!detail::is_valid_answer(json)) {
             return verdict::malformed;
         }
         end({}, json);

@@ -26,6 +26,25 @@ struct bind_arguments {
     output_format format = output_format::automatic;
 };
 
+// The last value, in the reply to BIND, has no number.
+std::string with_publisher(const cles::feed_item<cles::json_text>& item) {
+    std::string text;
+    cles::json_writer w{text};
+    w.begin_object();
+    w.plain_key("node");
+    w.value(std::string_view{item.publisher});
+    w.plain_key("seq");
+    if (item.kind == cles::feed_event::update) {
+        w.value(item.seq);
+    } else {
+        w.null();
+    }
+    w.plain_key("update");
+    w.raw(item.value.text);
+    w.end_object();
+    return text;
+}
+
 // For `all:` each update is shown with its publisher.
 void show(printer& out, const bind_arguments& args, const cles::feed_item<cles::json_text>& item) {
     const auto seq = item.kind == cles::feed_event::update ? std::to_string(item.seq) : "-";
@@ -36,7 +55,7 @@ void show(printer& out, const bind_arguments& args, const cles::feed_item<cles::
         leading.insert(leading.begin(), {"NODE", printable(item.publisher), false});
         out.print(item.value.text, std::move(leading));
     } else {
-        out.print(R"({"node":")" + item.publisher + R"(","seq":)" + seq + R"(,"update":)" + item.value.text + "}");
+        out.print(with_publisher(item));
     }
 }
 

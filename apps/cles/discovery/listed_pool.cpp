@@ -15,6 +15,17 @@ std::string text_at(const json_node& of, std::string_view name) {
     return found != nullptr ? found->text : std::string{};
 }
 
+// A scalar that is no string; empty for anything else.
+std::string number_at(const json_node& of, std::string_view name) {
+    const auto* found = of.find(name);
+    return found != nullptr && found->kind == json_node::type::other ? found->text : std::string{};
+}
+
+void write_number(cles::json_writer& w, std::string_view name, const std::string& number) {
+    w.key(name);
+    w.raw(number.empty() ? "null" : number);
+}
+
 } // namespace
 
 std::vector<listed_pool> pools_in(std::string_view node, const json_node& metrics) {
@@ -30,8 +41,8 @@ std::vector<listed_pool> pools_in(std::string_view node, const json_node& metric
             out.push_back({.bridge = std::string{node},
                            .pool = text_at(each, "pool"),
                            .state = connected ? text_at(each, "state") : "no NATS",
-                           .bridges = text_at(each, "bridges"),
-                           .nodes = text_at(each, "nodes")});
+                           .bridges = number_at(each, "bridges"),
+                           .nodes = number_at(each, "nodes")});
         }
     }
     if (out.empty()) {
@@ -74,10 +85,8 @@ std::string pools_json(const std::vector<listed_pool>& pools) {
         w.key("state");
         w.value(std::string_view{each.state});
         if (!each.pool.empty()) {
-            w.key("bridges");
-            w.raw(each.bridges);
-            w.key("nodes");
-            w.raw(each.nodes);
+            write_number(w, "bridges", each.bridges);
+            write_number(w, "nodes", each.nodes);
         }
         w.end_object();
     }

@@ -18,6 +18,8 @@ namespace cles::detail {
 /// The maximum depth of brackets in a reply.
 inline constexpr std::size_t answer_depth = json_writer::most_levels;
 inline bool is_valid_answer(std::string_view json) { return is_valid_json(json, answer_depth); }
+/// The same for an answer that becomes a part of the answer of `all`, inside of two more brackets.
+inline bool is_valid_part(std::string_view json) { return is_valid_json(json, answer_depth - 2); }
 
 /// A pending operation. Its owner ends it once, with `offer`, `fail` or `discard`, which destroy it.
 class pending {
@@ -28,15 +30,16 @@ class pending {
 
     enum class verdict : std::uint8_t { completed, malformed };
 
-    /// Completes with the text of the result. `malformed`: it is not JSON, and the operation stays pending.
-    virtual verdict offer(std::string_view json) = 0;
+    /// Completes with the text of the result. `malformed`: it is not JSON, and the operation stays pending, for a
+    /// later reply or its deadline.
+    [[nodiscard]] virtual verdict offer(std::string_view json) = 0;
     /// As `offer`, for a reply to BIND that says which update it contains.
-    virtual verdict offer_marked(std::string_view json, const update_mark& mark) {
+    [[nodiscard]] virtual verdict offer_marked(std::string_view json, const update_mark& mark) {
         static_cast<void>(mark);
         return offer(json);
     }
     /// As `offer`, for a reply with which the peer grants a slot (<cles/sharing.hpp>).
-    virtual verdict offer_granted(std::string_view json, std::uint64_t /*grant*/) { return offer(json); }
+    [[nodiscard]] virtual verdict offer_granted(std::string_view json, std::uint64_t /*grant*/) { return offer(json); }
     virtual void fail(boost::system::error_code code, std::string_view message) = 0;
     /// As `fail`, for a failure reported by the peer; `answer` is its whole reply.
     virtual void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) {

@@ -3,6 +3,7 @@
 #include <cles/feed.hpp>
 
 #include "api/engine.hpp"
+#include "node/base/completion_queue.hpp"
 #include "node/publish/feed_machine.hpp"
 #include "node/publish/feed_mailbox.hpp"
 #include "node/publish/group_feeds.hpp"
@@ -147,7 +148,7 @@ class group_feed_handle final : public feed_handle {
                 const bool stopped = host().stopped();
                 bound.release()->fail(stopped ? errc::stopped : errc::cancelled, "the feed was closed");
             } else {
-                bound.release()->offer("{}");
+                core::end_with(std::move(bound), "{}");
             }
         });
     }

@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "federation/outbound_requests.hpp"
 
+#include <cles/json_writer.hpp>
+
 #include "federation/carried_line.hpp"
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
 #include <utility>
 
 namespace cles::bridging {
@@ -22,6 +27,23 @@ constexpr std::uint32_t golden_ratio = 0x9e3779b9U;
 std::string_view without_pool(std::string_view target, std::string_view pool) {
     const bool has_it = target.size() > pool.size() + 1 && target.starts_with(pool) && target[pool.size()] == '.';
     return has_it ? target.substr(pool.size() + 1) : target;
+}
+
+// What a bridge says of a pool: replies to BIND have marks.
+std::string description_of(std::string_view pool) {
+    std::string text;
+    json_writer w{text};
+    w.begin_object();
+    w.plain_key("pool");
+    w.value(pool);
+    w.plain_key("protocol");
+    w.value(std::uint64_t{1});
+    w.plain_key("features");
+    w.begin_array();
+    w.value(std::string_view{"mark"});
+    w.end_array();
+    w.end_object();
+    return text;
 }
 
 } // namespace
@@ -57,7 +79,7 @@ void outbound_requests::answer_for_itself(const bridge_link& from, const protoco
         feeds_.cancel(*id);
     } else if (r.verb == verb::pull && r.noun.path == "cles") { // whether replies to BIND have marks
         if (r.id != 0) {
-            out_.deliver(from, reply_line(r.id, R"({"pool":")" + from.pool + R"(","protocol":1,"features":["mark"]})"));
+            out_.deliver(from, reply_line(r.id, description_of(from.pool)));
         }
     } else if (r.noun.path != "cles/leaving") {
         refuse(from, r.id, {.code = errc::no_target, .message = "'self' is no node of the pool '" + from.pool + "'"});

@@ -44,6 +44,14 @@ bool read_texts(json_reader& r, F&& take) {
     return r.ok();
 }
 
+/// Begins the next member of an object whose members are collected without its braces. Its value follows, as JSON.
+inline void begin_member(std::string& members, std::string_view name) {
+    if (!members.empty()) {
+        members.push_back(',');
+    }
+    json_writer{members}.key(name);
+}
+
 /// Writes a member of an object: text, a number, a flag or an array of texts. Its name needs no escapes.
 template <class T>
 void write_member(json_writer& w, std::string_view name, const T& value) {

@@ -5,11 +5,19 @@
 #include <utility>
 
 namespace cles::core {
+
+void end_with(detail::pending_ptr operation, std::string_view json) {
+    auto* const ending = operation.release(); // if its handler throws, it has ended
+    if (ending->offer(json) == detail::pending::verdict::malformed) {
+        ending->fail(errc::conversion, "the answer is not valid JSON");
+    }
+}
+
 namespace {
 
 struct caller {
     void operator()(completion::failure& due) const { due.operation.release()->fail(due.code, due.why); }
-    void operator()(completion::result& due) const { due.operation.release()->offer(due.json); }
+    void operator()(completion::result& due) const { end_with(std::move(due.operation), due.json); }
     void operator()(completion::event_failure& due) const { due.operation.release()->fail(due.code, due.why); }
     void operator()(completion::event& due) const { due.operation.release()->deliver(due.what.view()); }
     void operator()(const completion::callback& due) const { due.function(); }

@@ -49,6 +49,9 @@ struct kept_event {
     std::string text;
 };
 
+/// Ends the operation with this result; with a failure if it cannot be read as JSON, because nothing else would end it.
+void end_with(detail::pending_ptr operation, std::string_view json);
+
 /// One pending call of user code: an operation with its outcome, or a callback. It is called once; if it is destroyed
 /// instead, it discards the operation, as Asio does when an execution context is destroyed.
 class completion {

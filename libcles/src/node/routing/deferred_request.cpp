@@ -3,6 +3,7 @@
 
 #include <cles/json_reader.hpp>
 
+#include "json/json_members.hpp"
 #include "node/routing/load_balancer.hpp"
 #include "node/routing/other_pools.hpp"
 #include "node/session/request_checks.hpp"
@@ -32,10 +33,6 @@ std::vector<other_pools::known_pool> other_pools_for(const node_state& host, con
     return host.pools && peer.transport != "pool" && r.hops != 0 && r.noun.task != "cles"
                ? host.pools->list()
                : std::vector<other_pools::known_pool>{};
-}
-
-void begin_member(std::string& in, std::string_view node) {
-    in.append(in.empty() ? "\"" : ",\"").append(node).append("\":"); // a name needs no escapes
 }
 
 } // namespace
@@ -370,23 +367,15 @@ void scatter_gather::withdraw() {
 // -- the reply -----------------------------------------------------------------------------------------------------
 
 void aggregate_reply::add(std::string_view node, const node_outcome& found) {
-    constexpr std::size_t levels_around = 2;
-    constexpr auto depth = detail::answer_depth - levels_around;
     if (!found.result) {
-        begin_member(errors_, node);
-        protocol::failure why{.code = errc::deadline, .message = std::string{node} + " did not answer in time"};
-        why = found.failure.value_or(why);
-        if (!is_valid_json(why.answer, depth)) {
-            why.answer.clear(); // its code and message are enough
-        }
-        append_failure(errors_, why);
+        const protocol::failure late{.code = errc::deadline, .message = std::string{node} + " did not answer in time"};
+        add_error(node, found.failure ? *found.failure : late);
         return;
     }
-    if (!is_valid_json(*found.result, depth)) { // the requester would drop the whole reply
-        add(node, {.failure = protocol::failure{.code = errc::failed,
-                                                .message = std::string{node} + ": the answer is nested deeper than " +
-                                                           std::to_string(depth) + " levels",
-                                                .ran = true}});
+    if (!detail::is_valid_part(*found.result)) { // requesters could not read the answers of the others either
+        add_error(
+            node,
+            {.code = errc::failed, .message = std::string{node} + ": the answer is nested too deeply", .ran = true});
         return;
     }
     begin_member(results_, node);
@@ -396,6 +385,14 @@ void aggregate_reply::add(std::string_view node, const node_outcome& found) {
         marks_.append(R"({"seq":)").append(std::to_string(found.mark->seq));
         marks_.append(R"(,"epoch":")").append(protocol::epoch_text(found.mark->epoch)).append("\"}");
     }
+}
+
+void aggregate_reply::add_error(std::string_view node, protocol::failure why) {
+    if (!detail::is_valid_part(why.answer)) {
+        why.answer.clear(); // its code and message are enough
+    }
+    begin_member(errors_, node);
+    append_failure(errors_, why);
 }
 
 void aggregate_reply::add_pool(std::string_view pool, const node_outcome& found) {
@@ -419,7 +416,7 @@ void aggregate_reply::add_pool(std::string_view pool, const node_outcome& found)
         while (reader.next_key(node)) {
             const auto name = std::string{pool}.append(".").append(node);
             std::string_view value;
-            if (reader.read_raw(value) && protocol::is_name(node)) { // anything else would have to be escaped
+            if (reader.read_raw(value) && protocol::is_name(node)) {
                 begin_member(*into, name);
                 into->append(value);
             }

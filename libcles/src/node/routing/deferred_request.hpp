@@ -133,6 +133,8 @@ class aggregate_reply {
     [[nodiscard]] std::string whole() const;
 
   private:
+    void add_error(std::string_view node, protocol::failure why);
+
     bool with_marks_;
     std::string results_;
     std::string errors_;

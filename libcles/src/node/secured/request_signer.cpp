@@ -17,6 +17,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -55,13 +56,13 @@ bool may_sign_for(local_node& host, const repeatable_request& r, const std::stri
     return node == member;
 }
 
-// Where a node is reached that a request for `target` has led to: in the pool that was named, since its name alone may
 // How long this node goes on waiting. At least 1 ms, which requests state at least.
 std::uint32_t waits_ms(const repeatable_request& r, time_point now) {
     const auto left = std::chrono::floor<std::chrono::milliseconds>(r.deadline - now).count();
     return static_cast<std::uint32_t>(std::clamp<std::int64_t>(left, 1, std::int64_t{protocol::max_deadline_ms}));
 }
 
+// Where a node is reached that a request for `target` has led to: in the pool that was named, since its name alone may
 // not be known here.
 std::string address_in_pool(local_node& host, const std::string& target, const std::string& node) {
     const auto member = member_of(host.node(), target);
@@ -155,9 +156,12 @@ class gathered_reply {
     }
     void on_outcome(const std::string& node, const peer_answer& found) {
         const auto host = host_.lock();
-        if (!found.code) {
+        if (!found.code && detail::is_valid_part(found.json)) {
             errors_.erase(node);
             results_.insert_or_assign(node, std::string{found.json});
+        } else if (!found.code) {
+            errors_.insert_or_assign(
+                node, failure_text({.code = errc::failed, .message = node + ": the answer is nested too deeply"}));
         } else if (!found.refusal.empty()) {
             errors_.insert_or_assign(node, std::string{found.refusal});
         } else if (found.code == errc::cancelled) {
@@ -182,7 +186,8 @@ class gathered_reply {
     static std::string members(const outcomes& all) {
         std::string text;
         for (const auto& [node, json] : all) {
-            text.append(text.empty() ? "\"" : ",\"").append(node).append("\":").append(json);
+            begin_member(text, node); // named by the node that has gathered them
+            text.append(json);
         }
         return text;
     }
@@ -261,9 +266,13 @@ class attempt_of_request final : public detail::pending {
             return false;
         }
         std::map<std::string, std::string> signatures;
+        std::set<std::string, std::less<>> members; // a second signature would let a member run the request twice
         for (const auto& [node, error] : whole->errors()) {
+            const auto member = member_of(host->node(), node);
             std::string sig;
-            if (signing_node(*host, request_, error, sig) == member_of(host->node(), node)) {
+            if (protocol::is_name(node) && !members.contains(member) &&
+                signing_node(*host, request_, error, sig) == member) {
+                members.emplace(member);
                 signatures.emplace(node, std::move(sig));
             }
         }

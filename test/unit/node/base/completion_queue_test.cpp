@@ -102,6 +102,16 @@ BOOST_AUTO_TEST_CASE(a_users_operation_completes_later_and_the_librarys_own_at_o
     BOOST_TEST((said == lines{"user's failed busy: full", "user's has {}"}));
 }
 
+// Nothing else would end it.
+BOOST_AUTO_TEST_CASE(a_result_that_is_not_json_fails_its_operation) {
+    auto [users, result] = cles::test::record();
+    queue.succeed(std::move(users), "{\"a\"b\":1}");
+    run();
+    BOOST_TEST(result->ended);
+    BOOST_TEST((result->code == errc::conversion));
+    BOOST_TEST(result->text == "the answer is not valid JSON");
+}
+
 BOOST_AUTO_TEST_CASE(a_completion_put_during_a_call_is_called_after_it) {
     queue.fail(operation("one", true, [this] { queue.fail(operation("three"), errc::busy, ""); }), errc::busy, "");
     queue.fail(operation("two"), errc::busy, "");

@@ -123,6 +123,11 @@ struct fixture {
         environment->run();
         return result;
     }
+    void pass(std::chrono::nanoseconds time) {
+        environment->clock.advance(time);
+        local->node().deadlines.expire(environment->clock.now());
+        environment->run();
+    }
     std::string take() { return std::exchange(environment->link->lines, {}); }
     static std::string id_in(const std::string& line) {
         const auto at = line.find(" id=");
@@ -173,11 +178,6 @@ BOOST_AUTO_TEST_CASE(it_signs_for_the_node_of_another_pool) {
     BOOST_TEST(!result->code);
 }
 
-BOOST_AUTO_TEST_CASE(not_for_another_node) {
-    for (const std::string node : {"car3", "sat1", "north.car1", "north", "any", ""}) {
-        const auto result = ask("north.car1:strike/now");
-        BOOST_TEST(reply(take(), denied_by(node)).empty(), node);
-        BOOST_TEST(result->ended, node);
 BOOST_AUTO_TEST_CASE(it_signs_how_long_it_still_waits) {
     ask("north.car1:strike/now");
     const auto first = take();
@@ -186,6 +186,11 @@ BOOST_AUTO_TEST_CASE(it_signs_how_long_it_still_waits) {
     BOOST_TEST(second.find(" sig=" + signature("car1", 25'999) + " ") != std::string::npos, second);
 }
 
+BOOST_AUTO_TEST_CASE(not_for_another_node) {
+    for (const std::string node : {"car3", "sat1", "north.car1", "north", "any", ""}) {
+        const auto result = ask("north.car1:strike/now");
+        BOOST_TEST(reply(take(), denied_by(node)).empty(), node);
+        BOOST_TEST(result->ended, node);
         BOOST_TEST((result->code == errc::denied), node);
     }
 }
@@ -218,6 +223,70 @@ BOOST_AUTO_TEST_CASE(a_second_challenge_is_not_answered) {
     const auto second = reply(take(), denied_by("car1"));
     BOOST_TEST(reply(second, denied_by("car1")).empty());
     BOOST_TEST((result->code == errc::denied));
+}
+
+// -- replies to `all` of a node that may state anything ---------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(names_in_a_reply_to_all_are_written_as_json) {
+    const auto result = ask("all:strike/now");
+    const auto second = reply(take(), R"({"results":{"x\"}\u001b,{":1},"errors":{"car1":)" + denied_by("car1") + "}}");
+    BOOST_TEST(second.starts_with("DELEGATE car1:strike/now id="), second);
+    reply(second, "{\"done\":true}");
+    BOOST_TEST(result->ended);
+    BOOST_TEST(result->text == R"({"results":{"car1":{"done":true},"x\"}\u001b,{":1},"errors":{}})");
+}
+
+BOOST_AUTO_TEST_CASE(nothing_is_signed_for_what_is_no_name) {
+    for (const std::string name : {"x\\n.car1", "x y.car1", "\\\".car1"}) {
+        const auto result = ask("all:strike/now");
+        const auto json = R"({"results":{},"errors":{")" + name + "\":" + denied_by("car1") + "}}";
+        BOOST_TEST(reply(take(), json).empty(), name);
+        BOOST_TEST(result->text == json, name);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_member_gets_one_signature_for_all) {
+    const auto result = ask("all:strike/now");
+    const auto second = reply(take(), R"({"results":{},"errors":{"north.car1":)" + denied_by("car1") +
+                                          R"(,"south.car1":)" + denied_by("car1") + "}}");
+    BOOST_TEST(second.find(" sig=") != std::string::npos, second);
+    BOOST_TEST(second.find(" sig=") == second.rfind(" sig="), second);
+    reply(second, "{}");
+    BOOST_TEST(result->text == R"({"results":{"north.car1":{}},"errors":{"south.car1":)" + denied_by("car1") + "}}");
+}
+
+BOOST_AUTO_TEST_CASE(an_answer_that_is_too_deep_in_all_is_an_error_of_its_node) {
+    const auto nested = [](std::size_t depth) { return std::string(depth, '[') + std::string(depth, ']'); };
+    for (const std::size_t depth : {33U, 34U, 35U}) {
+        const auto result = ask("all:strike/now");
+        reply(reply(take(), R"({"results":{},"errors":{"car1":)" + denied_by("car1") + "}}"), nested(depth));
+        BOOST_TEST(result->ended, depth);
+        BOOST_TEST((result->text.find("nested too deeply") != std::string::npos) == (depth > 33), result->text);
+    }
+}
+
+// Whatever is answered, and when: it is not answered in time, or the operation ends earlier.
+BOOST_AUTO_TEST_CASE(no_request_outlives_its_deadline) {
+    const auto denied = denied_by("car1");
+    for (const std::string target : {"car1", "north.car1", "any", "all"}) {
+        for (const std::string& first :
+             {std::string{"{"}, std::string{"[1"}, std::string{"{\"a\":\"\x01\"}"}, std::string{"{}garbage"},
+              std::string{"{\"error\":\"busy\""}, std::string{"progress=0.5 {}"}, std::string{"progress=2 {}"},
+              std::string(40, '[') + std::string(40, ']'), denied, denied + "x",
+              R"({"results":{"\"":1},"errors":{"car1":)" + denied + "}}",
+              R"({"results":{},"errors":{"car1":)" + denied + R"(,"a\"b":{}}})"}) {
+            for (const std::string second : {"{", "{\"a\":", "progress=0.5 {}", "{\"error\":\"denied\"", ""}) {
+                const auto result = ask(target + ":strike/now");
+                pass(10s);
+                if (const auto repeated = reply(take(), first); !repeated.empty() && !second.empty()) {
+                    reply(repeated, second);
+                }
+                pass(20s);
+                BOOST_TEST(result->ended, target << ' ' << first << ' ' << second);
+                take();
+            }
+        }
+    }
 }
 
 BOOST_AUTO_TEST_SUITE_END()
