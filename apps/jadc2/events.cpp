@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "events.hpp"
 
+#include <cles/printable.hpp>
+
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -29,20 +31,24 @@ std::string fixed(double number, int digits) {
     return text.data();
 }
 
-void event_log::write(std::string_view event, std::string_view text, std::string_view data) const {
+void event_log::write(std::string_view event, std::string_view text, const lines& more, std::string_view data) const {
     const double now = utc_now();
+    std::string shown = cles::printable(text);
+    for (const auto& line : more) {
+        shown.append("\n    ").append(cles::printable(line));
+    }
     if (json_) {
-        entry out{.utc = now, .who = who_, .event = std::string{event}, .text = std::string{text}};
+        entry out{.utc = now, .who = who_, .event = std::string{event}, .text = shown};
         out.data.text = data;
-        std::puts(cles::to_json(out).c_str());
+        std::puts(cles::printable(cles::to_json(out)).c_str());
     } else {
         const auto second = static_cast<std::time_t>(now);
         std::tm parts{};
         ::gmtime_r(&second, &parts);
         std::array<char, 16> clock{};
         std::strftime(clock.data(), clock.size(), "%H:%M:%S", &parts);
-        std::printf("%s.%03d %s: %.*s\n", clock.data(), static_cast<int>((now - std::floor(now)) * 1000), who_.c_str(),
-                    static_cast<int>(text.size()), text.data());
+        std::printf("%s.%03d %s: %s\n", clock.data(), static_cast<int>((now - std::floor(now)) * 1000), who_.c_str(),
+                    shown.c_str());
     }
     std::fflush(stdout); // so that the reader of a pipe gets it at once
 }

@@ -169,7 +169,7 @@ void mission::tell(const story& record) {
     const auto whom = record.fate == "done"
                           ? " by " + record.struck_by + ", " + std::to_string(record.outcome.left) + " weapons left"
                           : ": " + record.trouble;
-    events_.log("strike", "order " + record.order + " is " + record.fate + whom + to_text(record), record);
+    events_.log("strike", "order " + record.order + " is " + record.fate + whom, record, lines_of(record));
 }
 
 // Only once: people have to find out what happened to an order whose answer is lost.
@@ -236,13 +236,14 @@ void mission::show() {
     }
     shown_utc_ = received_utc_;
     const auto& seen = commander_.latest();
-    std::string text = std::to_string(seen.tracks.size()) + " targets";
+    event_log::lines lines;
     for (const auto& t : seen.tracks) {
-        text += "\n    " + std::to_string(t.id) + "  at " + fixed(t.lat, 5) + ", " + fixed(t.lon, 5) + " to " +
-                fixed(t.sigma, 1) + " m, " + fixed(std::hypot(t.ve, t.vn), 0) + " m/s towards " +
-                fixed(course_of(t), 0) + " degrees, followed for " + fixed(t.age, 1) + " s";
+        lines.push_back(std::to_string(t.id) + "  at " + fixed(t.lat, 5) + ", " + fixed(t.lon, 5) + " to " +
+                        fixed(t.sigma, 1) + " m, " + fixed(std::hypot(t.ve, t.vn), 0) + " m/s towards " +
+                        fixed(course_of(t), 0) + " degrees, followed for " + fixed(t.age, 1) + " s");
     }
-    events_.log("picture", text + "\n    strike NUMBER, or quit:", seen);
+    lines.emplace_back("strike NUMBER, or quit:");
+    events_.log("picture", std::to_string(seen.tracks.size()) + " targets", seen, lines);
 }
 
 boost::asio::awaitable<void> mission::read_orders() {

@@ -21,12 +21,12 @@ story begin_story(const picture& seen, const fmv::track& target, double received
             .data_to_decision_ms = (decided_utc - seen.captured) * 1000};
 }
 
-std::string to_text(const story& what) {
-    std::string text;
-    const auto row = [&text](const std::string& name, double ms) {
+std::vector<std::string> lines_of(const story& what) {
+    std::vector<std::string> lines;
+    const auto row = [&lines](const std::string& name, double ms) {
         std::array<char, 128> line{};
-        std::snprintf(line.data(), line.size(), "\n    %-44s %10.3f ms", name.c_str(), ms);
-        text += line.data();
+        std::snprintf(line.data(), line.size(), "%-44s %10.3f ms", name.c_str(), ms);
+        lines.emplace_back(line.data());
     };
     row("frame " + std::to_string(what.frame) + " captured and encoded", what.encode_ms);
     row("to " + what.processed_by + " and back", what.fmv_way_ms);
@@ -41,7 +41,7 @@ std::string to_text(const story& what) {
         row("carried out at " + what.struck_by, what.strike_run_ms);
         row("data to answer", what.data_to_answer_ms);
     }
-    return text;
+    return lines;
 }
 
 } // namespace jadc2

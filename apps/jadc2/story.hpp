@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 namespace jadc2 {
 
@@ -42,7 +43,7 @@ BOOST_DESCRIBE_STRUCT(story, (),
 /// The part until the decision.
 story begin_story(const picture& seen, const fmv::track& target, double received_utc, double decided_utc);
 
-/// A table of the steps.
-std::string to_text(const story& what);
+/// A line for each step.
+std::vector<std::string> lines_of(const story& what);
 
 } // namespace jadc2

@@ -203,6 +203,21 @@ class Wire(unittest.TestCase):
             self.assertTrue(err.startswith(f"cles: {shown}: why "), err)
             self.assertNotIn("\x1b", err)
 
+    def test_what_controls_a_terminal_is_not_shown(self):
+        controls = [*range(0x7f, 0xa0), 0x61c, 0x200e, 0x200f, *range(0x202a, 0x202f), *range(0x2066, 0x206a)]
+        text = "".join(f"{chr(each)}x" for each in controls)
+        escaped = "".join(f"\\u{each:04x}x" for each in controls)
+        for form in ("json", "raw", "table"):
+            (code, out, err), _ = self.ask(f'{{"{text}":"{text}"}}', "pull", "car1:x", "-o", form)
+            self.assertEqual((code, err), (0, ""), form)
+            shown = f"{escaped}  {escaped}" if form == "table" else f'{{"{escaped}":"{escaped}"}}'
+            self.assertEqual(out, shown + "\n", form)
+        (code, out, err), _ = self.ask(f'{{"error":"denied","message":"{text}"}}', "pull", "car1:x")
+        self.assertEqual((code, out, err), (5, "", f"cles: denied: {escaped}\n"))
+        (code, _, err), _ = self.ask(f'{{"a":"{text}"}}', "pull", "car1:x", "-vv")
+        self.assertEqual(code, 0)
+        self.assertIn(f'{{"a":"{escaped}"}}', err)
+
     def test_a_link_lost_after_sending(self):
         with ScriptedNode(lambda line, send: "close") as node:
             code, out, err = cles("pull", "car1:x", "--at", node.url)

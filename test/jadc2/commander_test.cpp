@@ -92,9 +92,10 @@ BOOST_AUTO_TEST_CASE(the_steps_of_a_story_are_all_of_it) {
     BOOST_TEST(told.tracks_way_ms == 3, boost::test_tools::tolerance(1e-6));
     BOOST_TEST(told.decide_ms == 1, boost::test_tools::tolerance(1e-6));
     BOOST_TEST(told.data_to_decision_ms == 16, boost::test_tools::tolerance(1e-6));
-    const auto text = jadc2::to_text(told);
-    BOOST_TEST(text.find("processed at sat1") != std::string::npos);
-    BOOST_TEST(text.find("data to answer") == std::string::npos); // there is none
+    const auto lines = jadc2::lines_of(told);
+    BOOST_REQUIRE_EQUAL(lines.size(), 8U);
+    BOOST_TEST(lines[3].starts_with("processed at sat1"), lines[3]);
+    BOOST_TEST(lines.back().starts_with("data to decision"), lines.back()); // there is no answer
 }
 
 BOOST_AUTO_TEST_SUITE_END()

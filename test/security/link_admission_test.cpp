@@ -363,7 +363,7 @@ BOOST_AUTO_TEST_CASE(a_refusal_is_quoted_without_control_characters_and_not_for_
     one->receive(R"({"error":"denied","message":"no\u001b[2J )" + std::string(5000, 'x') + "\"}");
     BOOST_TEST((one->decision == verdict::refused));
     BOOST_TEST((one->admission->refused_for() == reason::by_peer));
-    BOOST_TEST(contains(one->admission->why(), "no?[2J xxx"));
+    BOOST_TEST(contains(one->admission->why(), "no\\u001b[2J xxx"));
     BOOST_TEST(one->admission->why().size() < 300U);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/printable.hpp>
+
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -19,15 +21,17 @@ std::string bold(stream s, std::string_view text);
 /// The text in red, where the stream supports it.
 std::string red(stream s, std::string_view text);
 
-/// Makes text from elsewhere safe for a terminal: control characters, and those that change the direction of writing,
-/// become escapes, so that a peer's text cannot control the terminal.
-std::string printable(std::string_view text);
+/// For text from elsewhere, before it is put into lines and tables.
+using cles::printable;
 
 /// The columns that printable text takes, counting characters.
 std::size_t width_of(std::string_view text);
 
 /// The text, filled with spaces up to that width, at its left or right.
 std::string padded(std::string text, std::size_t width, bool align_right = false);
+
+// What is written contains no control characters but those of C0. Others, and those that change the direction of
+// writing, become escapes; in JSON they mean the same.
 
 /// Writes all of the text to stdout, at once, so that the reader of a pipe sees each document as soon as it is there.
 /// \throws output_closed, output_interrupted, or a system error

@@ -86,7 +86,7 @@ class error : public boost::system::system_error {
     error(errc code, std::string message);
     error(boost::system::error_code code, std::string message);
 
-    /// The peer's or the library's message, without the code's name.
+    /// The peer's or the library's message, without the code's name. That of a peer is `printable`.
     [[nodiscard]] const std::string& message() const noexcept { return message_; }
     [[nodiscard]] const char* what() const noexcept override { return what_.c_str(); }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/json_reader.hpp>
+#include <cles/printable.hpp>
 
 #include "json/json_scan.hpp"
 
@@ -70,7 +71,8 @@ std::string json_reader::error() const {
     if (!path_.empty()) {
         text.append(path_).append(": ");
     }
-    return text.append(message_).append(" (at byte ").append(std::to_string(failed_at_)).append(")");
+    text.append(message_).append(" (at byte ").append(std::to_string(failed_at_)).append(")");
+    return printable(text); // the path has keys from the text
 }
 
 json_reader::kind json_reader::peek() noexcept {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/grammar.hpp"
 
+#include <cles/printable.hpp>
+
 #include "json/json_scan.hpp"
 
 #include <algorithm>
@@ -187,10 +189,11 @@ std::string_view canonical_path(const noun_view& noun, std::string& scratch) {
 
 std::string quoted(std::string_view text) {
     constexpr std::size_t longest = 48;
-    std::string out{"'"};
-    out.append(text.substr(0, longest));
-    out.append(text.size() > longest ? "...'" : "'");
-    return out;
+    auto end = std::min(text.size(), longest);
+    while (end < text.size() && end > 0 && (static_cast<unsigned char>(text[end]) & 0xC0U) == 0x80U) {
+        --end; // whole characters
+    }
+    return "'" + printable(text.substr(0, end)) + (text.size() > longest ? "...'" : "'");
 }
 
 bool split_adverb(std::string_view part, adverb& out) noexcept {

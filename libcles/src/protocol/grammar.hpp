@@ -99,7 +99,7 @@ bool parse_noun(std::string_view text, noun_view& out, std::string& why);
 /// `scratch`.
 std::string_view canonical_path(const noun_view& noun, std::string& scratch);
 
-/// Text from a peer, quoted and shortened for a message.
+/// Text from a peer, quoted, shortened and printable, for a message.
 [[gnu::cold]] std::string quoted(std::string_view text);
 
 } // namespace cles::protocol

@@ -3,6 +3,7 @@
 
 #include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>
+#include <cles/printable.hpp>
 
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
@@ -71,7 +72,10 @@ bool parse_failure(std::string_view body, failure& out) {
                 out.code = errc_from_wire(name);
             }
         } else if (key == "message" && reader.peek() == json_reader::kind::string) {
-            reader.read(out.message);
+            std::string_view text;
+            if (reader.read(text)) {
+                out.message = printable(text); // programs show it
+            }
         } else if (key == "node" && reader.peek() == json_reader::kind::string) {
             reader.read(out.node);
         } else if (key == "challenge" && reader.peek() == json_reader::kind::string) {

@@ -40,7 +40,7 @@ inline constexpr std::uint64_t default_retry_ms = 100;
 
 struct failure {
     errc code = errc::failed;
-    std::string message;
+    std::string message; ///< of a parsed one: printable
     std::optional<std::uint64_t> retry_ms{};
     bool ran = false;
     std::string node{};      ///< which executes the request if it is signed; empty: it need not be

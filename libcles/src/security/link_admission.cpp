@@ -2,6 +2,7 @@
 #include "security/link_admission.hpp"
 
 #include <cles/json_reader.hpp>
+#include <cles/printable.hpp>
 
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
@@ -55,19 +56,13 @@ std::optional<hello> read_hello(std::string_view body) {
     return reader.at_end() && said.version != 0 && !said.epoch.empty() ? std::optional{said} : std::nullopt;
 }
 
-// The message of a failure, without control characters.
+// The beginning of a failure's message.
 std::string quoted_message(std::string_view body) {
     protocol::failure said;
     if (!protocol::parse_failure(body, said)) {
         return {};
     }
-    said.message.resize(std::min(said.message.size(), max_quoted));
-    for (auto& c : said.message) {
-        if (static_cast<unsigned char>(c) < ' ' || c == '\x7F') {
-            c = '?';
-        }
-    }
-    return said.message;
+    return printable(std::string_view{said.message}.substr(0, max_quoted)); // the last character may be cut
 }
 
 } // namespace

@@ -2,50 +2,26 @@
 #include "daemon/daemon_log.hpp"
 
 #include <cles/json_writer.hpp>
+#include <cles/printable.hpp>
 
 #include <spdlog/logger.h>
 #include <spdlog/sinks/ansicolor_sink.h>
 
-#include <array>
-#include <cstdio>
 #include <cstdlib>
 #include <utility>
 
 #include <unistd.h>
 
 namespace cles::runtime {
-namespace {
-
-void append_printable(std::string& out, std::string_view text) {
-    for (const char c : text) {
-        const auto byte = static_cast<unsigned char>(c);
-        if (byte >= 0x20 && byte != 0x7f) {
-            out += c;
-        } else if (c == '\n') {
-            out += "\\n";
-        } else if (c == '\t') {
-            out += "\\t";
-        } else {
-            std::array<char, 8> escape{};
-            std::snprintf(escape.data(), escape.size(), "\\x%02x", static_cast<unsigned>(byte));
-            out += escape.data();
-        }
-    }
-}
-
-} // namespace
-
 std::string format_text(std::string_view node, const log_entry& entry) {
-    std::string out;
-    append_printable(out, node);
+    std::string out{node};
     if (!entry.peer.empty()) {
-        append_printable(out.append(" "), entry.peer);
+        out.append(" ").append(entry.peer);
     }
     if (entry.request != 0) {
         out.append(" id=").append(std::to_string(entry.request));
     }
-    append_printable(out.append(": "), entry.text);
-    return out;
+    return printable(out.append(": ").append(entry.text));
 }
 
 std::string format_json(std::string_view node, const log_entry& entry) {
@@ -69,7 +45,7 @@ std::string format_json(std::string_view node, const log_entry& entry) {
     w.plain_key("message");
     w.value(entry.text);
     w.end_object();
-    return out.substr(1, out.size() - 2);
+    return printable(std::string_view{out}.substr(1, out.size() - 2));
 }
 
 namespace {

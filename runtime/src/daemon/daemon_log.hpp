@@ -16,12 +16,12 @@ class logger;
 
 namespace cles::runtime {
 
-/// A log entry for people, on one line: "sat1 tcp://127.0.0.1:4242 id=7: denied". Control characters are escaped, so
-/// that a peer's text can neither control a terminal nor start a new line.
+/// A log entry for people, on one line: "sat1 tcp://127.0.0.1:4242 id=7: denied". It is printable, so that a peer's
+/// text can neither control a terminal nor start a new line.
 std::string format_text(std::string_view node, const log_entry& entry);
 
 /// The same as the members of a JSON object, without braces: `"node":"sat1","peer":"tcp://…","id":7,"trace":"4bf9…",
-/// "message":"…"`. Missing ones are omitted.
+/// "message":"…"`. Missing ones are omitted. It is printable, too.
 std::string format_json(std::string_view node, const log_entry& entry);
 
 /// The daemon's log, on stderr: text, in colour on a terminal (unless NO_COLOR is set), or JSON, one object per line.

@@ -24,9 +24,15 @@ BOOST_AUTO_TEST_CASE(json_omits_missing_members) {
 }
 
 BOOST_AUTO_TEST_CASE(control_characters_are_escaped) {
-    BOOST_TEST(format_text("sat1", "a\nb\tc\x1b[31md\x7f") == "sat1: a\\nb\\tc\\x1b[31md\\x7f");
+    BOOST_TEST(format_text("sat1", "a\nb\tc\x1b[31md\x7f") == "sat1: a\\nb\\tc\\u001b[31md\\u007f");
     BOOST_TEST(format_text("sat1", "gr\xc3\xbc\xc3\x9f") == "sat1: gr\xc3\xbc\xc3\x9f");
     BOOST_TEST(format_json("sat1", "a\n\"b\"") == R"("node":"sat1","message":"a\n\"b\"")");
+    const std::string foreign = "\xc2\x9b"
+                                "2J\xc2\x9d\xe2\x80\xae\xe2\x81\xa6\xd8\x9c\xe2\x80\x8e";
+    const std::string shown = R"(\u009b2J\u009d\u202e\u2066\u061c\u200e)";
+    BOOST_TEST(format_text("sat1", {foreign, foreign}) == "sat1 " + shown + ": " + shown);
+    BOOST_TEST(format_json("sat1", {foreign, foreign}) ==
+               R"("node":"sat1","peer":")" + shown + R"(","message":")" + shown + "\"");
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -211,4 +211,11 @@ BOOST_AUTO_TEST_CASE(text_from_a_peer_is_quoted_with_a_limited_length) {
     BOOST_TEST(cles::protocol::quoted(std::string(10'000, 'x')).size() < 100U);
 }
 
+BOOST_AUTO_TEST_CASE(quoted_text_is_printable_and_short) {
+    BOOST_TEST(cles::protocol::quoted("a\x1b\xc2\x9b\xe2\x80\xae\xff") == "'a\\u001b\\u009b\\u202e\xef\xbf\xbd'");
+    const std::string longest(46, 'x');
+    BOOST_TEST(cles::protocol::quoted(longest + "\xe2\x82\xac") == "'" + longest + "...'"); // no part of a character
+    BOOST_TEST(cles::protocol::quoted(longest + "yz") == "'" + longest + "yz'");
+}
+
 BOOST_AUTO_TEST_SUITE_END()

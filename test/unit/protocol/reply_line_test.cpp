@@ -203,4 +203,12 @@ BOOST_AUTO_TEST_CASE(the_heads_of_replies_are_written) {
     BOOST_TEST(parse(out + "{}").line.progress.value() == 1.0);
 }
 
+// Programs show it, in `what()` for example.
+BOOST_AUTO_TEST_CASE(the_message_of_a_failure_is_printable) {
+    cles::protocol::failure why;
+    BOOST_TEST(cles::protocol::parse_failure(
+        "{\"error\":\"denied\",\"message\":\"a\\u001b[2J\\n\xc2\x9b\xe2\x80\xae\"}", why));
+    BOOST_TEST(why.message == "a\\u001b[2J\\n\\u009b\\u202e");
+}
+
 BOOST_AUTO_TEST_SUITE_END()

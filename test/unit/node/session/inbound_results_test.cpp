@@ -124,7 +124,7 @@ BOOST_AUTO_TEST_CASE(a_failure_fits_into_a_line_whatever_its_message) {
         BOOST_TEST(answer.size() <= limit + 1);
         const auto reply = cles::test::read_reply(std::string_view{answer}.substr(0, answer.size() - 1));
         BOOST_TEST(reply.error == "failed");
-        BOOST_TEST(reply.message.starts_with("car1: \xC3\xA4\n\""), reply.message);
+        BOOST_TEST(reply.message.starts_with("car1: \xC3\xA4\\n\""), reply.message);
         BOOST_TEST(reply.message.find("\xEF\xBF\xBD") == std::string::npos); // not truncated inside a character
     }
 }
