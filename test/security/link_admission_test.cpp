@@ -150,6 +150,27 @@ BOOST_AUTO_TEST_CASE(an_old_roster_shuts_out_no_newer_member) {
     BOOST_TEST(older.admission->name() == "car3");
 }
 
+BOOST_AUTO_TEST_CASE(a_removed_member_is_told_from_a_stranger) {
+    auto member = car1();
+    authority.remove("car2");
+    member.terms->fleet->offer(authority.newest().line());
+    authority.rotate();
+    member.terms->fleet->offer(authority.newest().line());
+    auto removed = car2();
+    connect(member, removed);
+    BOOST_TEST((member.decision == verdict::refused));
+    BOOST_TEST((member.admission->refused_for() == reason::removed));
+    BOOST_TEST(member.admission->why() == "car2 was removed from the fleet: its key is not in roster 5");
+    BOOST_TEST(contains(removed.admission->why(), "the key of this node is not in roster 5")); // as strangers are told
+    authority.add(node("car2"));
+    member.terms->fleet->offer(authority.newest().line());
+    auto again = car1();
+    again.terms->fleet->offer(authority.newest().line());
+    auto returned = car2();
+    connect(again, returned);
+    BOOST_TEST((again.decision == verdict::admitted));
+}
+
 BOOST_AUTO_TEST_CASE(a_stranger_is_denied_and_gets_no_roster) {
     auto member = car1();
     auto founded = fleet_authority::found(key_of("fleet"));

@@ -50,14 +50,18 @@ using cles::tls::tls_errc;
 struct node_with_tls {
     node_with_tls(std::string_view name, std::shared_ptr<const roster> known, std::chrono::milliseconds to_open = 5s)
         : of(std::make_shared<fleet>(std::string{name}, key_of(name), std::move(known))),
-          transport(
-              cles::tls::make_tls_transport({.fleet = of,
-                                             .epoch = "5f3a09c1",
-                                             .report = [this](std::string_view why) { reports.emplace_back(why); },
-                                             .time_to_open = to_open})) {}
+          transport(cles::tls::make_tls_transport({.fleet = of,
+                                                   .epoch = "5f3a09c1",
+                                                   .report =
+                                                       [this](const auto& refused) {
+                                                           reports.emplace_back(refused.why);
+                                                           sources.emplace_back(refused.source);
+                                                       },
+                                                   .time_to_open = to_open})) {}
 
     std::shared_ptr<fleet> of;
     std::vector<std::string> reports{};
+    std::vector<std::string> sources{};
     std::unique_ptr<cles::link_transport> transport;
 };
 
@@ -213,6 +217,7 @@ BOOST_AUTO_TEST_CASE(another_name_than_expected_is_no_link) {
     end near;
     BOOST_TEST(dial(car1, near, "car3") == make_error_code(tls_errc::other_name));
     BOOST_TEST(car1.reports.at(0) == "the other end is car2, not car3");
+    BOOST_TEST(car1.sources.at(0) == "127.0.0.1");
     run_until(io, [&] { return accepted.at(0)->events->lost(); });
     BOOST_TEST(accepted[0]->events->lines.empty());
 }

@@ -32,9 +32,9 @@ void equip(made_security& made, asio_port::asio_environment& environment, core::
     environment.add_transport("tls",
                               tls::make_tls_transport({.fleet = secured->members(),
                                                        .epoch = protocol::epoch_text(node.epoch),
-                                                       .report = [weak = std::weak_ptr{secured}](std::string_view why) {
+                                                       .report = [weak = std::weak_ptr{secured}](const auto& refused) {
                                                            if (const auto alive = weak.lock()) {
-                                                               alive->log_refused_link(why);
+                                                               alive->log_refused_link(refused);
                                                            }
                                                        }}));
     environment.add_transport("udp", tls::make_sealed_udp(secured->members(), secured->datagrams()));

@@ -146,6 +146,10 @@ link_admission::verdict link_admission::look_up(std::string& out) {
     if (found == nullptr) {
         const auto version = std::to_string(terms_->fleet->in_force().version());
         append_refusal(out, errc::denied, "the key of this node is not in roster " + version);
+        if (const auto* const former = terms_->fleet->find_former(key_)) {
+            return refuse(reason::removed,
+                          *former + " was removed from the fleet: its key is not in roster " + version);
+        }
         return refuse(reason::not_member, "the other end's key is not in roster " + version);
     }
     if (!expected_.empty() && found->name != expected_) {

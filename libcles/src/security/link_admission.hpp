@@ -32,6 +32,7 @@ class link_admission {
         none,
         protocol,   ///< the other end sent something else
         not_member, ///< its key is not in the roster
+        removed,    ///< nor is it, but it was in an earlier one
         other_name, ///< it is another member than expected
         by_peer,    ///< it refused this end
         busy,       ///< too many rosters arrive at the same time

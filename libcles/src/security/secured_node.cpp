@@ -31,18 +31,10 @@ void secured_node::log(log_level level, std::string text) const {
     }
 }
 
-void secured_node::log_refused_link(std::string_view why) {
-    constexpr std::size_t max_remembered = 32;
-    if (time_ == nullptr) {
-        return;
-    }
-    const auto now = time_->now();
-    while (!refused_.empty() && now - refused_.front().at >= log_again_after) {
-        refused_.pop_front();
-    }
-    if (refused_.size() < max_remembered && std::ranges::find(refused_, why, &refused_link::why) == refused_.end()) {
-        refused_.push_back({.why = std::string{why}, .at = now});
-        log(log_level::warning, std::string{why});
+void secured_node::log_refused_link(const refused_link& link) {
+    if (time_ != nullptr && refused_.take(link, time_->now())) {
+        auto text = std::string{link.why};
+        log(log_level::warning, link.source.empty() ? text : text.append(" (").append(link.source).append(")"));
     }
 }
 
@@ -178,8 +170,9 @@ std::shared_ptr<core::group_port> secured_node::seal(std::shared_ptr<core::group
 
 std::unique_ptr<core::message_seal> secured_node::seal_messages() {
     return std::make_unique<sealed_messages>(*fleet_, system_entropy(), [this](std::string_view line) {
-        if (const auto why = offer_roster(line)) {
-            log_refused_link("a roster of another bridge is refused: " + *why);
+        if (const auto refused = offer_roster(line)) {
+            const auto why = "a roster of another bridge is refused: " + *refused;
+            log_refused_link({.kind = link_admission::reason::none, .why = why}); // of no link, so of a kind of its own
         }
     });
 }

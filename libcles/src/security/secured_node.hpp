@@ -6,10 +6,10 @@
 #include "security/datagrams/sealed_datagrams.hpp"
 #include "security/fleet/fleet.hpp"
 #include "security/fleet/key_directory.hpp"
+#include "security/refused_links.hpp"
 
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -28,7 +28,6 @@ class secured_node : public core::node_security {
     /// How long a member that did not deliver its roster is not asked again: at first, and at most.
     static constexpr std::chrono::seconds ask_again_after{1};
     static constexpr std::chrono::minutes longest_pause{1};
-    static constexpr std::chrono::minutes log_again_after{1};
 
     /// \throws security_error
     explicit secured_node(const std::string& directory);
@@ -39,9 +38,8 @@ class secured_node : public core::node_security {
     [[nodiscard]] const std::shared_ptr<sealed_datagrams>& datagrams() const noexcept { return datagrams_; }
     /// Writes to the node's log.
     void log(log_level level, std::string text) const;
-    /// Warns of a link that was not opened, and why. Others decide how often they try, so the same reason is logged
-    /// once a minute at most.
-    void log_refused_link(std::string_view why);
+    /// Warns of a link that was not opened, and why, as far as `refused_links` permits.
+    void log_refused_link(const refused_link& link);
 
     // node_security
     void begin(std::string_view name, std::uint32_t epoch, const core::clock& time,
@@ -72,10 +70,6 @@ class secured_node : public core::node_security {
     bool wants_roster(std::string_view from, std::uint32_t version, time_point now) override;
 
   private:
-    struct refused_link {
-        std::string why;
-        time_point at{};
-    };
     struct asked_member {
         std::uint32_t version = 0;
         time_point at{};
@@ -106,7 +100,7 @@ class secured_node : public core::node_security {
     std::shared_ptr<sealed_datagrams> datagrams_;
     core::security_observer* observer_ = nullptr;
     const core::clock* time_ = nullptr; // since `begin`
-    std::deque<refused_link> refused_;  // that were logged in the last minute
+    refused_links refused_;
     std::shared_ptr<void> observation_; // of the fleet
     std::map<std::string, asked_member, std::less<>> asked_;
     directory_state files_; // at the last check

@@ -29,7 +29,8 @@ tls_errc code_of(admission::reason why) noexcept {
     switch (why) {
     case admission::reason::none: break;
     case admission::reason::protocol: return tls_errc::bad_admission;
-    case admission::reason::not_member: return tls_errc::not_member;
+    case admission::reason::not_member:
+    case admission::reason::removed: return tls_errc::not_member;
     case admission::reason::other_name: return tls_errc::other_name;
     case admission::reason::by_peer: return tls_errc::refused_by_peer;
     case admission::reason::busy: return tls_errc::busy;
@@ -48,16 +49,17 @@ struct shared_terms {
 
     tls_context context;
     std::shared_ptr<security::admission_terms> admission;
-    std::function<void(std::string_view)> report;
+    std::function<void(const security::refused_link&)> report;
     std::chrono::milliseconds time_to_open;
 };
 
 /// The codec of a `tls` link: it is open when the TLS handshake and the admission are complete.
 class tls_codec final : public transport::stream_codec {
   public:
-    tls_codec(std::shared_ptr<const shared_terms> shared, tls_engine::role as, std::string expected)
+    tls_codec(std::shared_ptr<const shared_terms> shared, tls_engine::role as, std::string expected,
+              std::string address)
         : shared_(std::move(shared)), engine_(shared_->context, as),
-          admission_(shared_->admission, std::move(expected)) {}
+          admission_(shared_->admission, std::move(expected)), address_(std::move(address)) {}
 
     std::span<char> prepare() override { return engine_.prepare(); }
     void commit(std::size_t count) override { engine_.commit(count); }
@@ -155,7 +157,8 @@ class tls_codec final : public transport::stream_codec {
         }
         why = code_of(admission_.refused_for());
         if (shared_->report) {
-            shared_->report(admission_.why());
+            const auto host = address_.empty() ? std::string{} : parse_url(address_).host;
+            shared_->report({.kind = admission_.refused_for(), .source = host, .why = admission_.why()});
         }
         return status::failed;
     }
@@ -163,6 +166,7 @@ class tls_codec final : public transport::stream_codec {
     std::shared_ptr<const shared_terms> shared_;
     tls_engine engine_;
     admission admission_;
+    std::string address_;                        // of the other end; empty: it is gone already
     std::optional<protocol::line_buffer> lines_; // of the admission, once the handshake is done
     std::string rest_;                           // what followed them
     std::shared_ptr<void> observation_;          // of the roster
@@ -193,8 +197,8 @@ class tls_transport final : public link_transport {
 
   private:
     [[nodiscard]] transport::codec_maker codecs(tls_engine::role as, std::string_view expected) const {
-        return [shared = shared_, as, expected = std::string{expected}] {
-            return std::make_unique<tls_codec>(shared, as, expected);
+        return [shared = shared_, as, expected = std::string{expected}](const identity& peer) {
+            return std::make_unique<tls_codec>(shared, as, expected, peer.address);
         };
     }
 

@@ -4,6 +4,7 @@
 #include <cles/link.hpp>
 
 #include "security/fleet/fleet.hpp"
+#include "security/refused_links.hpp"
 
 #include <chrono>
 #include <functional>
@@ -16,8 +17,8 @@ namespace cles::tls {
 struct tls_options {
     std::shared_ptr<security::fleet> fleet; ///< of the node; used on the executor of its links
     std::string epoch;                      ///< of the node
-    /// Receives, for people, why a link was refused.
-    std::function<void(std::string_view)> report{};
+    /// Receives each link that was refused, and why.
+    std::function<void(const security::refused_link&)> report{};
     /// For the handshake and the admission.
     std::chrono::milliseconds time_to_open = std::chrono::seconds{5};
 };

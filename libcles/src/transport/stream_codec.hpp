@@ -69,6 +69,6 @@ class stream_codec {
 };
 
 /// Makes the codec of a connection; empty for links without one.
-using codec_maker = std::function<std::unique_ptr<stream_codec>()>;
+using codec_maker = std::function<std::unique_ptr<stream_codec>(const identity& peer)>;
 
 } // namespace cles::transport

@@ -64,8 +64,8 @@ void stream_dialler::on_connected(error_code code) {
 
 void stream_dialler::make_link() {
     auto peer = identify_(socket_);
-    made_ = std::make_shared<stream_link>(std::move(socket_), std::move(peer), bounds_,
-                                          make_codec_ ? make_codec_() : nullptr);
+    auto codec = make_codec_ ? make_codec_(peer) : nullptr;
+    made_ = std::make_shared<stream_link>(std::move(socket_), std::move(peer), bounds_, std::move(codec));
     if (make_codec_) {
         made_->open([weak = weak_from_this()](error_code code) {
             if (const auto self = weak.lock()) {
@@ -146,8 +146,8 @@ void stream_acceptor::close() {
 
 void stream_acceptor::hand_over(stream_socket socket) {
     auto peer = identify_(socket);
-    const auto made = std::make_shared<stream_link>(std::move(socket), std::move(peer), bounds_,
-                                                    make_codec_ ? make_codec_() : nullptr);
+    auto codec = make_codec_ ? make_codec_(peer) : nullptr;
+    const auto made = std::make_shared<stream_link>(std::move(socket), std::move(peer), bounds_, std::move(codec));
     if (make_codec_) {
         made->open();
     }

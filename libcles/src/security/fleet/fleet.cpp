@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/fleet/fleet.hpp"
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -77,8 +78,25 @@ fleet::verdict fleet::judge(std::string_view line, std::string& why) {
     }
     const auto before = roster_;
     why = adopt(std::move(next));
+    note_removed(*before);
     notify(*before);
     return verdict::adopted;
+}
+
+void fleet::note_removed(const roster& before) {
+    for (const auto& each : before.members()) {
+        if (roster_->find(each.key) == nullptr && find_former(each.key) == nullptr) {
+            former_.push_back({.key = each.key, .name = each.name});
+        }
+    }
+    while (former_.size() > max_members) {
+        former_.pop_front();
+    }
+}
+
+const std::string* fleet::find_former(const public_key& key) const {
+    const auto found = std::ranges::find(former_, key, &former_member::key);
+    return found != former_.end() && roster_->find(key) == nullptr ? &found->name : nullptr;
 }
 
 // An observer may end observations: each is kept alive during its call, and looked up only when it is its turn.

@@ -5,6 +5,7 @@
 #include "security/fleet/roster.hpp"
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -37,6 +38,9 @@ class fleet {
     [[nodiscard]] std::shared_ptr<const roster> share() const noexcept { return roster_; }
     /// This node's entry; null once it has been removed, also if its key is listed under another name.
     [[nodiscard]] const member* self() const noexcept { return self_; }
+    /// The name of the member of that key that a roster has removed since this was created; null if there is none. The
+    /// last ones are known, as many as a roster may have.
+    [[nodiscard]] const std::string* find_former(const public_key& key) const;
     /// Whether this node is the same member as in that roster.
     [[nodiscard]] bool is_same_since(const roster& before) const { return self_ != nullptr && before.has(*self_); }
     /// Empty if this node has been removed, or if the roster in force has group keys that it cannot open.
@@ -58,13 +62,20 @@ class fleet {
 
     [[nodiscard]] verdict judge(std::string_view line, std::string& why);
     [[nodiscard]] std::string adopt(std::shared_ptr<const roster> next);
+    void note_removed(const roster& before);
     void notify(const roster& before);
+
+    struct former_member {
+        public_key key;
+        std::string name;
+    };
 
     std::string name_;
     signing_key own_;
     std::shared_ptr<const roster> roster_;
     const member* self_ = nullptr;
     group_key_ring ring_;
+    std::deque<former_member> former_; // oldest first
     bool reported_fork_ = false;
     std::vector<std::weak_ptr<observation>> observers_;
 };
