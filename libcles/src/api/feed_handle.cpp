@@ -112,7 +112,10 @@ class link_feed final : public feed_handle {
                                     std::move(path), thinned, seed()) {}
 
     [[nodiscard]] core::feed_machine& machine() noexcept { return machine_; }
-    void start(pending_ptr bound) override { machine_.start(std::move(bound)); }
+    void start(pending_ptr bound) override {
+        const auto limit = core::time_limit(machine_.entry().terms.deadline, verb::bind);
+        machine_.start(std::move(bound), core::saturating_add(host().now(), limit));
+    }
     void next(event_ptr operation) override { fetch(machine_.mail(), std::move(operation)); }
     void cancel(const pending_event* operation) override { machine_.mail().cancel(operation); }
     void close() override {

@@ -14,9 +14,12 @@ feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, completio
       max_line_(bounds.line), completions_(completions), mail_(bounds, completions), backoff_(seed), jitter_(~seed),
       lease_(bounds.lease) {}
 
-void feed_machine::start(detail::pending_ptr bound) {
+void feed_machine::start(detail::pending_ptr bound, time_point due) {
     first_ = std::move(bound);
     state_ = state::binding;
+    if (due != time_point::max()) {
+        deadlines_.arm(*this, due);
+    }
     host_.bind(*this);
 }
 
@@ -25,6 +28,7 @@ void feed_machine::on_bound(std::string_view last, const std::optional<update_ma
         return;
     }
     state_ = state::bound;
+    deadlines_.disarm(*this);
     backoff_.reset();
     // The events are queued before the caller's operation completes, so that it finds them in order.
     const std::string body{last};
@@ -144,8 +148,10 @@ void feed_machine::expedite(time_point now) {
     }
 }
 
-void feed_machine::on_deadline(time_point) {
-    if (state_ == state::pausing) {
+void feed_machine::on_deadline(time_point now) {
+    if (first_) {
+        on_refused(errc::deadline, "no answer was received in time", now);
+    } else if (state_ == state::pausing) {
         state_ = state::binding;
         host_.bind(*this);
     } else if (state_ == state::bound) {

@@ -84,8 +84,9 @@ class feed_machine final
                  std::string target, std::string path, bool thinned, std::uint32_t seed);
     ~feed_machine() = default;
 
-    /// Binds for the first time. The operation completes with the reply; if it fails, the feed is closed.
-    void start(detail::pending_ptr bound);
+    /// Binds for the first time. The operation completes with the reply, or fails at `due`, whatever it waits for then;
+    /// if it fails, the feed is closed.
+    void start(detail::pending_ptr bound, time_point due = time_point::max());
     /// `mark`: the update that holds the last value, if the publisher says so. If it is new, it is delivered as an
     /// update too.
     void on_bound(std::string_view last, const std::optional<update_mark>& mark = {});

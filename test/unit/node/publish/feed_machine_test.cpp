@@ -68,9 +68,9 @@ struct fixture {
         first = begin();
         feed.on_bound(last);
     }
-    std::shared_ptr<cles::test::outcome> begin() {
+    std::shared_ptr<cles::test::outcome> begin(cles::time_point due = cles::time_point::max()) {
         auto [operation, result] = cles::test::record();
-        feed.start(std::move(operation));
+        feed.start(std::move(operation), due);
         return result;
     }
     void update(std::uint64_t seq, std::string_view epoch = "0000000a", std::string_view body = "{}") {
@@ -118,6 +118,26 @@ BOOST_AUTO_TEST_CASE(start_binds_and_the_reply_completes_it) {
     BOOST_TEST(result->ended);
     BOOST_TEST(!result->code);
     BOOST_TEST(next() == "(nothing)"); // there was no last value
+}
+
+// It may wait for a link, for what the node supports, or for the reply: each takes the peer's time.
+BOOST_AUTO_TEST_CASE(the_first_bind_ends_at_its_deadline) {
+    const auto result = begin(clock.now() + 5s);
+    pass(4999ms);
+    BOOST_TEST(!result->ended);
+    pass(1ms);
+    BOOST_TEST(result->ended);
+    BOOST_TEST((result->code == cles::errc::deadline));
+    BOOST_TEST(host.unbinds == 1);
+    BOOST_TEST(feed.closed());
+}
+
+BOOST_AUTO_TEST_CASE(a_feed_that_is_bound_has_no_deadline) {
+    const auto result = begin(clock.now() + 5s);
+    feed.on_bound("{}");
+    pass(1h);
+    BOOST_TEST(!result->code);
+    BOOST_TEST(feed.is_bound());
 }
 
 BOOST_AUTO_TEST_CASE(the_last_value_comes_as_the_first_event) {
