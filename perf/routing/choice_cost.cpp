@@ -25,13 +25,17 @@ struct system_time final : core::clock {
 
 /// Other nodes, which report what they offer, and receive no requests.
 struct telling final : core::next_hop {
-    std::uint64_t send(const cles::protocol::outgoing_request& r, cles::time_point, cles::detail::pending_ptr reply,
-                       core::outbound::progress_function, std::string_view) override {
+    std::uint64_t forward(const core::forwarding_permit&, const cles::protocol::outgoing_request&, cles::time_point,
+                          cles::detail::pending_ptr, core::outbound::progress_function) override {
+        return 0;
+    }
+    std::uint64_t send_own(const cles::protocol::outgoing_request& r, cles::time_point,
+                           cles::detail::pending_ptr reply) override {
         asked.emplace_back(r.target(), std::move(reply));
         return asked.size();
     }
     void cancel(std::uint64_t) override {}
-    std::shared_ptr<void> bind(std::string_view, std::string_view, std::string_view, core::feed_events&) override {
+    std::shared_ptr<void> bind(const core::forwarding_permit&, std::string_view, core::feed_events&) override {
         return {};
     }
     void answer() {

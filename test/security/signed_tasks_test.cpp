@@ -2,9 +2,9 @@
 #include <cles/routing.hpp>
 
 #include "security/keys/signed_text.hpp"
+#include "security/raw_member.hpp"
 #include "security/secured_services.hpp"
 #include "support/group_address.hpp"
-#include "tls/tls_transport.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -42,59 +42,6 @@ struct weapon {
     [[nodiscard]] std::size_t runs() const { return bodies.size(); }
 
     std::vector<std::string> bodies;
-};
-
-/// A member that speaks without the library, such as one that forwards and alters.
-class raw_member final : public cles::link_events, public std::enable_shared_from_this<raw_member> {
-  public:
-    static std::shared_ptr<raw_member> connect(boost::asio::io_context& io, const secured_fleet& fleet,
-                                               const std::string& name, const cles::service& to) {
-        auto made = std::make_shared<raw_member>(io);
-        auto own = cles::security::key_directory{fleet.directory_of(name)}.read_node();
-        made->transport_ =
-            cles::tls::make_tls_transport({.fleet = std::make_shared<cles::security::fleet>(
-                                               own.own.name, std::move(own.own.key), std::move(own.newest)),
-                                           .epoch = "0000beef"});
-        made->transport_->dial(io.get_executor(), cles::parse_url(to.endpoints().front()), {},
-                               [made](boost::system::error_code code, cles::link_ptr link) {
-                                   BOOST_REQUIRE(!code);
-                                   made->link_ = std::move(link);
-                                   made->link_->start(made);
-                               });
-        cles::test::run_until(io, [&] { return made->link_ != nullptr; });
-        return made;
-    }
-    explicit raw_member(boost::asio::io_context& io) : io_(io) {}
-
-    /// The reply to a request with the id 7.
-    std::string ask(const std::string& line) {
-        replies_.clear();
-        link_->output().append(line + "\n");
-        link_->flush();
-        cles::test::run_until(io_, [&] { return !replies_.empty(); });
-        return replies_.front();
-    }
-    void close() {
-        link_->close();
-        link_.reset();
-    }
-
-    void on_line(std::string_view line) override {
-        if (line.starts_with("id=7 ")) {
-            replies_.emplace_back(line.substr(5));
-        }
-    }
-    void on_overlong(std::string_view) override {}
-    void on_batch() override {}
-    void on_end() override {}
-    void on_lost(boost::system::error_code) override {}
-    void on_writable() override {}
-
-  private:
-    boost::asio::io_context& io_;
-    std::unique_ptr<cles::link_transport> transport_;
-    cles::link_ptr link_;
-    std::vector<std::string> replies_;
 };
 
 std::string text_after(const std::string& text, const std::string& before) {

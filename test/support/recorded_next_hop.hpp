@@ -40,8 +40,16 @@ class recorded_next_hop final : public core::next_hop {
         [[nodiscard]] bool open() const noexcept { return reply != nullptr; }
     };
 
-    std::uint64_t send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
-                       core::outbound::progress_function progress, std::string_view) override {
+    std::uint64_t forward(const core::forwarding_permit&, const protocol::outgoing_request& r, time_point deadline,
+                          detail::pending_ptr reply, core::outbound::progress_function progress) override {
+        return record(r, deadline, std::move(reply), std::move(progress));
+    }
+    std::uint64_t send_own(const protocol::outgoing_request& r, time_point deadline,
+                           detail::pending_ptr reply) override {
+        return record(r, deadline, std::move(reply), {});
+    }
+    std::uint64_t record(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
+                         core::outbound::progress_function progress) {
         auto made = std::make_unique<sent>();
         made->ticket = ++last_ticket_;
         made->node = r.target();
@@ -96,10 +104,10 @@ class recorded_next_hop final : public core::next_hop {
             return line + "\n";
         }
     };
-    std::shared_ptr<void> bind(std::string_view node, std::string_view path, std::string_view adverbs,
+    std::shared_ptr<void> bind(const core::forwarding_permit& permit, std::string_view path,
                                core::feed_events& to) override {
         const auto made = std::make_shared<feed>();
-        made->text.append(node).append(":").append(path).append(" ").append(adverbs);
+        made->text.append(permit.node()).append(":").append(path).append(" ").append(permit.adverbs());
         made->to = &to;
         feeds_.push_back(made);
         return {static_cast<void*>(made.get()), [made](void*) { made->to = nullptr; }};
@@ -140,6 +148,14 @@ class recorded_next_hop final : public core::next_hop {
         throw std::runtime_error{"nothing is open"};
     }
     [[nodiscard]] std::size_t count() const noexcept { return all_.size(); }
+    /// All after the first ones.
+    [[nodiscard]] std::vector<std::string> texts_since(std::size_t first) const {
+        std::vector<std::string> texts;
+        for (auto i = first; i < all_.size(); ++i) {
+            texts.push_back(all_[i]->text);
+        }
+        return texts;
+    }
     [[nodiscard]] std::size_t count_open() const noexcept {
         std::size_t count = 0;
         for (const auto& s : all_) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "node/routing/other_pools.hpp"
 #include "node/routing/request_router.hpp"
 #include "support/recorded_next_hop.hpp"
 #include "support/session_fixture.hpp"
@@ -19,8 +20,9 @@ namespace cles::test {
 struct routing_fixture {
     routing_fixture() = default;
     /// Of a secured fleet, with a client that is a member.
-    routing_fixture(std::shared_ptr<core::node_security> security, const std::string& client)
-        : node({}, {}, {}, {}, std::move(security)), link(node, client) {}
+    routing_fixture(std::shared_ptr<core::node_security> security, const std::string& client,
+                    core::other_pools* pools = nullptr)
+        : node({}, {}, {}, {}, std::move(security), nullptr, pools), link(node, client) {}
     routing_fixture(const routing_fixture&) = delete;
     routing_fixture& operator=(const routing_fixture&) = delete;
     ~routing_fixture() { routing->stop(); }

@@ -18,13 +18,19 @@ namespace cles::test {
 class scripted_security final : public core::node_security {
   public:
     [[nodiscard]] bool is_member(std::string_view name) const override { return members.contains(std::string{name}); }
-    [[nodiscard]] bool allows(std::string_view requester, std::string_view provider, verb how,
+    [[nodiscard]] bool allows(const core::request_origin& by, std::string_view provider, verb how,
                               const protocol::noun_view& noun) const override {
-        return is_member(requester) && !denied.contains(std::string{requester} + " " + std::string{to_string(how)} +
-                                                        " " + std::string{provider} + ":" + std::string{noun.path});
+        if (by.requester == self && by.forwarder.empty() && provider == self) {
+            return true;
+        }
+        return is_member(by.requester) && !refuses_all_at.contains(std::string{provider}) &&
+               (by.forwarder.empty() || may_forward(by.forwarder, by.requester)) &&
+               !denied.contains(std::string{by.requester} + " " + std::string{to_string(how)} + " " +
+                                std::string{provider} + ":" + std::string{noun.path});
     }
     [[nodiscard]] bool may_forward(std::string_view forwarder, std::string_view requester) const override {
-        return is_member(requester) && forwarders.contains(std::string{forwarder});
+        return is_member(forwarder) && is_member(requester) &&
+               (forwarder == requester || forwarders.contains(std::string{forwarder}));
     }
     [[nodiscard]] std::string sign_update(std::string_view path, std::uint64_t seq, std::string_view epoch,
                                           std::string_view body) const override {
@@ -97,6 +103,7 @@ class scripted_security final : public core::node_security {
 
     std::set<std::string> members{"car1", "car2", "car3", "sat1"};
     std::set<std::string> denied;             ///< "car2 PULL car1:speed"
+    std::set<std::string> refuses_all_at{};   ///< nodes of which others may request nothing
     std::set<std::string> forwarders{"car1"}; ///< for everybody
     std::string self = "car1";                ///< whose security this is
     mutable int challenges = 0;               ///< that were drawn

@@ -29,7 +29,7 @@ class test_node {
   public:
     explicit test_node(limits bounds = {}, authoriser rules = {}, log_sink log = {},
                        core::completion_queue::runner complete = {}, std::shared_ptr<core::node_security> security = {},
-                       const detail::tracing_part* tracing = nullptr)
+                       const detail::tracing_part* tracing = nullptr, core::other_pools* pools = nullptr)
         : host(std::make_shared<core::node_state>(core::node_options{.name = "car1",
                                                                      .epoch = 0x5f3a09c1,
                                                                      .first_datagram_id = first_datagram_id,
@@ -37,6 +37,7 @@ class test_node {
                                                                      .authorise = std::move(rules),
                                                                      .security = std::move(security),
                                                                      .secured = &core::make_secured_protocol,
+                                                                     .pools = pools,
                                                                      .tracing = tracing,
                                                                      .log = std::move(log),
                                                                      .complete = std::move(complete)},
@@ -110,9 +111,9 @@ class test_link final : public recording_line_sink, public core::subscriber {
     test_link(test_node& at, std::size_t datagram) : test_link(at, datagram, {}) {}
     /// From a member of the fleet.
     test_link(test_node& at, std::string member) : test_link(at, 0, std::move(member)) {}
-    test_link(test_node& at, std::size_t datagram, std::string member)
+    test_link(test_node& at, std::size_t datagram, std::string member, std::string transport = "tcp")
         : recording_line_sink(datagram, std::make_shared<core::memory_account>(at.host->memory)),
-          at_(at), peer_{.transport = "tcp",
+          at_(at), peer_{.transport = std::move(transport),
                          .address = "tcp://127.0.0.1:1",
                          .name = std::move(member),
                          .uid = {},

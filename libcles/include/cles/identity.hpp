@@ -11,7 +11,7 @@
 
 namespace cles {
 
-/// The peer of a link, as far as the transport knows it. Complete when the first line arrives.
+/// The other end of a link, as far as the transport knows it. Complete when the first line arrives.
 struct identity {
     std::string transport;            ///< the scheme of its URL, such as "tcp"; or "multicast"
     std::string address;              ///< as a URL; for clients of a Unix socket, the socket that they connected to
@@ -24,10 +24,14 @@ struct identity {
 
 /// A request whose access is to be checked.
 struct access {
-    const identity& peer;
+    const identity& peer; ///< the other end of the link; if the request is forwarded, not the requester
     cles::verb verb;
     std::string_view task;
     std::string_view path; ///< the task and its parameters: "localization/fast"
+    /// As `request::requester`: in a secured fleet, the member whose request it is; empty if there is none, and without
+    /// security.
+    std::string_view requester{};
+    std::string_view forwarded_by{}; ///< as `request::forwarded_by`: the member that has forwarded it
 };
 
 /// Decides about access. Called before every request from a link is served, including those to the reserved task

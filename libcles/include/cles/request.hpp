@@ -32,6 +32,8 @@ struct request_data {
     const identity* peer = nullptr;
     time_point deadline{};
     std::string_view trace{};
+    std::string_view requester{};
+    std::string_view forwarded_by{};
 };
 
 /// Makes a copy that owns its text.
@@ -73,8 +75,15 @@ class request {
     [[nodiscard]] std::span<const std::string_view> parameters() const noexcept { return data_->parameters; }
     /// The JSON body; `{}` if there is none.
     [[nodiscard]] std::string_view body() const noexcept { return data_->body; }
-    /// The requester. The reference is valid as long as this request.
+    /// The other end of the link on which the request has arrived. If another node has forwarded the request, that is
+    /// this node, not the requester. The reference is valid as long as this request.
     [[nodiscard]] const identity& peer() const noexcept { return *data_->peer; }
+    /// In a secured fleet, the member whose request it is, and whose rights have been checked; the node itself for
+    /// requests of its own programs and of its user. Empty without security, where nobody proves a name.
+    [[nodiscard]] std::string_view requester() const noexcept { return data_->requester; }
+    /// In a secured fleet, the member that has forwarded the request for the requester, as it may by the roster; it is
+    /// the peer. Empty if the requester itself is the peer, and without security.
+    [[nodiscard]] std::string_view forwarded_by() const noexcept { return data_->forwarded_by; }
     /// When the requester stops waiting.
     [[nodiscard]] time_point deadline() const noexcept { return data_->deadline; }
     /// The trace that it belongs to, for `call_options::trace` of the requests that it causes; empty if there is none.

@@ -26,7 +26,8 @@ struct copy_with_peer {
 } // namespace
 
 void owned_request::assign(const request& what, std::shared_ptr<const identity> peer) {
-    auto size = what.node().size() + what.task().size() + what.body().size() + what.trace().size();
+    auto size = what.node().size() + what.task().size() + what.body().size() + what.trace().size() +
+                what.requester().size() + what.forwarded_by().size();
     for (const auto p : what.parameters()) {
         size += p.size();
     }
@@ -43,6 +44,8 @@ void owned_request::assign(const request& what, std::shared_ptr<const identity> 
     data_.task = copy(what.task());
     data_.body = copy(what.body());
     data_.trace = copy(what.trace());
+    data_.requester = copy(what.requester());
+    data_.forwarded_by = copy(what.forwarded_by());
     parameters_.clear();
     parameters_.reserve(what.parameters().size());
     for (const auto p : what.parameters()) {

@@ -289,7 +289,8 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     if (!protocol::parse_noun(text, noun, why)) {
         return fail_later(std::move(operation), code, std::move(why));
     }
-    if (!protocol::is_reserved_target(noun.target) && !permits(*node_, node_->name, noun.target, how, noun)) {
+    if (!protocol::is_reserved_target(noun.target) &&
+        !permits(*node_, {.requester = node_->name}, noun.target, how, noun)) {
         return fail_later(std::move(operation), errc::denied,
                           node_->name + " may not send " + std::string{to_string(how)} + " '" + std::string{noun.task} +
                               "' to " + std::string{noun.target});

@@ -8,6 +8,7 @@
 #include "port/environment.hpp"
 #include "port/group_port.hpp"
 #include "port/message_seal.hpp"
+#include "port/request_origin.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
 
@@ -62,10 +63,12 @@ class node_security {
     virtual void on_time(time_point now) = 0;
 
     [[nodiscard]] virtual bool is_member(std::string_view name) const = 0;
-    /// Whether `requester` may send this request to `provider`. For an update, `how` is BIND.
-    [[nodiscard]] virtual bool allows(std::string_view requester, std::string_view provider, verb how,
+    /// Whether the requester may send this request to `provider`, and its forwarder may pass it on. For an update,
+    /// `how` is BIND. This node may ask everything of itself, unless somebody states it as the requester: then it has
+    /// the rights in the roster.
+    [[nodiscard]] virtual bool allows(const request_origin& by, std::string_view provider, verb how,
                                       const protocol::noun_view& noun) const = 0;
-    /// Whether `forwarder` may pass on requests of `requester`.
+    /// Whether `forwarder` may pass on requests of `requester`. Each member may state its own name.
     [[nodiscard]] virtual bool may_forward(std::string_view forwarder, std::string_view requester) const = 0;
 
     /// The signature of an update of this node, for the adverb `sig`.

@@ -97,14 +97,15 @@ void secured_node::on_time(time_point now) {
 
 bool secured_node::is_member(std::string_view name) const { return fleet_->in_force().find(name) != nullptr; }
 
-bool secured_node::allows(std::string_view requester, std::string_view provider, verb how,
+bool secured_node::allows(const core::request_origin& by, std::string_view provider, verb how,
                           const protocol::noun_view& noun) const {
-    if (requester == name() && provider == name()) {
+    const bool is_own = by.requester == name() && by.forwarder.empty();
+    if (is_own && provider == name()) {
         return true;
     }
     noun_.assign(provider, noun);
-    return requester == name() ? policy_->sent({}, how, noun_).allowed()
-                               : policy_->received(requester, {}, how, noun_).allowed();
+    return is_own ? policy_->sent({}, how, noun_).allowed()
+                  : policy_->received(by.requester, by.forwarder, how, noun_).allowed();
 }
 
 bool secured_node::may_forward(std::string_view forwarder, std::string_view requester) const {

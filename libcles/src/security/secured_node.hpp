@@ -47,7 +47,7 @@ class secured_node : public core::node_security {
     void end() override;
     void on_time(time_point now) override;
     [[nodiscard]] bool is_member(std::string_view name) const override;
-    [[nodiscard]] bool allows(std::string_view requester, std::string_view provider, verb how,
+    [[nodiscard]] bool allows(const core::request_origin& by, std::string_view provider, verb how,
                               const protocol::noun_view& noun) const override;
     [[nodiscard]] bool may_forward(std::string_view forwarder, std::string_view requester) const override;
     [[nodiscard]] std::string sign_update(std::string_view path, std::uint64_t seq, std::string_view epoch,

@@ -137,10 +137,10 @@ bool host_security::is_member(std::string_view name) const {
     return secured_node::is_member(name) || fault_ == planted::removed_served;
 }
 
-bool host_security::allows(std::string_view requester, std::string_view provider, verb how,
+bool host_security::allows(const core::request_origin& by, std::string_view provider, verb how,
                            const protocol::noun_view& noun) const {
-    return secured_node::allows(requester, provider, how, noun) || fault_ == planted::rights_ignored ||
-           (fault_ == planted::removed_served && !secured_node::is_member(requester));
+    return secured_node::allows(by, provider, how, noun) || fault_ == planted::rights_ignored ||
+           (fault_ == planted::removed_served && !secured_node::is_member(by.requester));
 }
 
 std::shared_ptr<core::group_port> host_security::seal(std::shared_ptr<core::group_port> port) {
@@ -148,7 +148,7 @@ std::shared_ptr<core::group_port> host_security::seal(std::shared_ptr<core::grou
     return std::make_shared<reporting_port>(
         secured_node::seal(std::move(port)), std::move(below),
         [this](const core::group_datagram& bind) {
-            return secured_node::allows(bind.member, name(), verb::bind, bind.request->noun);
+            return secured_node::allows({.requester = bind.member}, name(), verb::bind, bind.request->noun);
         },
         fault_);
 }

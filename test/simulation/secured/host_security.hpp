@@ -25,7 +25,7 @@ class host_security final : public security::secured_node, public simulated_secu
     void begin(std::string_view name, std::uint32_t epoch, const core::clock& time,
                core::security_observer& observer) override;
     [[nodiscard]] bool is_member(std::string_view name) const override;
-    [[nodiscard]] bool allows(std::string_view requester, std::string_view provider, verb how,
+    [[nodiscard]] bool allows(const core::request_origin& by, std::string_view provider, verb how,
                               const protocol::noun_view& noun) const override;
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override;
 

@@ -10,6 +10,7 @@
 #include "node/session/inbound.hpp"
 #include "node/session/request_checks.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -58,8 +59,11 @@ void bind_requests::drop(const leased& which) {
 
 std::vector<bind_requests::leased> bind_requests::forbidden() const {
     std::vector<leased> found;
-    for (const auto& [path, requester] : requesters_) {
-        if (!permits(node_, requester, node_.name, verb::bind, path)) {
+    for (const auto& [path, all] : requesters_) {
+        const auto is_forbidden = [&](const owned_origin& by) {
+            return !permits(node_, by, node_.name, verb::bind, path);
+        };
+        if (std::ranges::any_of(all, is_forbidden)) {
             found.push_back({{}, {path}});
         }
     }
@@ -79,9 +83,8 @@ void bind_requests::drop_forbidden() {
 
 void bind_requests::serve_remote(const protocol::request_line& r, time_point due, time_point now, inbound& from) {
     std::string scratch;
-    const auto requester = requester_of(node_, peer_, r);
-    const leased which{std::string{r.noun.target},
-                       {std::string{protocol::canonical_path(r.noun, scratch)}, std::string{requester}}};
+    const auto by = origin_of(node_, peer_, r);
+    const leased which{std::string{r.noun.target}, {std::string{protocol::canonical_path(r.noun, scratch)}, by}};
     if (r.unbinds()) {
         drop(which);
         replies_.done(reply_target{r}, {});
@@ -98,7 +101,7 @@ void bind_requests::serve_remote(const protocol::request_line& r, time_point due
             std::make_unique<relayed_bindings>(node_.published, bound_, node_.active_router->relayed(), updates_);
     }
     set_lease(which, r, now);
-    node_.active_router->bind(r, requester, *remote_bindings_, due, now, from);
+    node_.active_router->bind(r, by, *remote_bindings_, due, now, from);
 }
 
 void bind_requests::set_lease(const leased& which, const protocol::request_line& r, time_point now) {
@@ -111,7 +114,7 @@ void bind_requests::set_lease(const leased& which, const protocol::request_line&
 void bind_requests::bind(topic& t, const protocol::request_line& r, std::string_view path, time_point now) {
     bound_.bind(t, {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep});
     if (node_.security) {
-        requesters_.insert_or_assign(std::string{path}, std::string{requester_of(node_, peer_, r)});
+        requesters_[std::string{path}].insert(origin_of(node_, peer_, r));
     }
     set_lease({{}, {std::string{path}}}, r, now);
 }
@@ -136,7 +139,7 @@ void bind_requests::serve(const protocol::request_line& r, time_point due, time_
     }
     try {
         ask_bind_handler(node_, peer_, r);
-        auto& t = open(path);
+        auto& t = open(path, r);
         replies_.done(reply_target{r}, t.last_body(), head_of(t, r.wants_mark));
         bind(t, r, path, now);
     } catch (...) {
@@ -144,8 +147,8 @@ void bind_requests::serve(const protocol::request_line& r, time_point due, time_
     }
 }
 
-topic& bind_requests::open(std::string_view path) {
-    if (!bound_.has(path) && bound_.size() >= node_.bounds.bindings) {
+topic& bind_requests::open(std::string_view path, const protocol::request_line& r) {
+    if ((!bound_.has(path) && bound_.size() >= node_.bounds.bindings) || !has_room_for_requester(path, r)) {
         throw error(errc::busy, node_.name + ": too many bindings on this link");
     }
     // Checked first: a BIND that cannot be answered must not bind.
@@ -155,6 +158,22 @@ topic& bind_requests::open(std::string_view path) {
         throw error(errc::busy, no_memory(node_).message);
     }
     return node_.published.open(path);
+}
+
+// Each member for which the peer binds a noun counts.
+bool bind_requests::has_room_for_requester(std::string_view path, const protocol::request_line& r) const {
+    if (r.from.empty()) {
+        return true;
+    }
+    const auto at = requesters_.find(path);
+    if (at != requesters_.end() && at->second.contains(origin_of(node_, peer_, r))) {
+        return true;
+    }
+    std::size_t known = 0;
+    for (const auto& [noun, all] : requesters_) {
+        known += all.size();
+    }
+    return known < std::max(max_requesters, node_.bounds.bindings);
 }
 
 void bind_requests::serve_later(const protocol::request_line& r, std::string_view path, time_point due, time_point now,
@@ -179,10 +198,10 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
                 return;
             }
             try {
-                if (!permits(node_, requester_of(node_, peer_, **wanted), node_.name, verb::bind, path)) {
+                if (!permits(node_, origin_of(node_, peer_, **wanted), node_.name, verb::bind, path)) {
                     throw error(errc::denied, "the right to bind '" + path + "' was withdrawn");
                 }
-                auto& t = open(path);
+                auto& t = open(path, **wanted);
                 // Bound before the reply, which may set off other requests of the peer; updates follow it later.
                 bind(t, **wanted, path, node_.time.now());
                 c->set_head(head_of(t, (*wanted)->wants_mark));
@@ -213,12 +232,15 @@ void ask_bind_handler(const node_state& host, const identity& peer, const protoc
     }
     std::string decoded;
     const auto parameters = decode(r.noun, decoded);
+    const auto by = origin_of(host, peer, r);
     const cles::detail::request_data data{.verb = r.verb,
                                           .node = host.name,
                                           .task = r.noun.task,
                                           .parameters = {parameters.data(), parameters.size()},
                                           .peer = &peer,
-                                          .deadline = {}};
+                                          .deadline = {},
+                                          .requester = by.requester,
+                                          .forwarded_by = by.forwarder};
     std::string unused;
     json_writer w{unused};
     h->plain(cles::request{data}, w);

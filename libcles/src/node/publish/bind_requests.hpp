@@ -8,11 +8,14 @@
 #include "node/routing/relays.hpp"
 #include "node/session/line_sink.hpp"
 #include "node/session/reply_writer.hpp"
+#include "port/request_origin.hpp"
 #include "protocol/request_line.hpp"
 
 #include <cstddef>
+#include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +32,9 @@ bool is_bind_decided_later(const node_state& host, const protocol::request_line&
 /// Serves BIND for one link, and holds the resulting bindings.
 class bind_requests {
   public:
+    /// Of all nouns of a link together, how many members it may bind them for.
+    static constexpr std::size_t max_requesters = 4096;
+
     bind_requests(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer,
                   reply_writer& replies);
 
@@ -74,7 +80,8 @@ class bind_requests {
                      inbound& from);
     void withdraw(std::string_view path);
     /// \throws cles::error if a limit is reached
-    topic& open(std::string_view path);
+    topic& open(std::string_view path, const protocol::request_line& request);
+    [[nodiscard]] bool has_room_for_requester(std::string_view path, const protocol::request_line& request) const;
     void set_lease(const leased& which, const protocol::request_line& request, time_point now);
 
     std::shared_ptr<node_state> shared_node_;
@@ -86,8 +93,9 @@ class bind_requests {
     link_bindings bound_;
     std::unique_ptr<relayed_bindings> remote_bindings_; // few links need it
     std::vector<asking> pending_;                       // whose handlers have not decided yet
-    std::map<std::string, std::string> requesters_;     // by path, of a secured node
-    leases<leased> leases_;                             // over datagrams: nothing shows that the peer has gone
+    // By path, of a secured node. A node that forwards binds a noun once on its link, for several clients.
+    std::map<std::string, std::set<owned_origin>, std::less<>> requesters_;
+    leases<leased> leases_; // over datagrams: nothing shows that the peer has gone
 };
 
 } // namespace cles::core

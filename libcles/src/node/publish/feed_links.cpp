@@ -149,7 +149,7 @@ void feed_links::refuse_later(feed_machine& feed, boost::system::error_code code
 // Feeds for clients have adverbs, with the client, whose rights have been checked.
 bool feed_links::is_permitted(feed_machine& feed) const {
     return !feed.entry().terms.adverbs.empty() || protocol::is_reserved_target(feed.target()) ||
-           permits(host_.node(), host_.node().name, feed.target(), verb::bind, feed.path());
+           permits(host_.node(), {.requester = host_.node().name}, feed.target(), verb::bind, feed.path());
 }
 
 void feed_links::bind(feed_machine& feed) {

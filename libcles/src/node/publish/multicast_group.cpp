@@ -216,7 +216,7 @@ bool multicast_group::take(const group_datagram& datagram, time_point now) {
     }
     auto& counts = node_->counts;
     if (protocol::begins_with_error(update.body) || !feeds_.wants(update) || sources_.is_foreign(from, now) ||
-        !permits(*node_, node_->name, noun.target, verb::bind, noun)) {
+        !permits(*node_, {.requester = node_->name}, noun.target, verb::bind, noun)) {
         ++counts.updates_dropped;
         return true;
     }

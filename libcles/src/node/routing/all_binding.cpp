@@ -11,16 +11,23 @@ namespace cles::core {
 
 all_binding::all_binding(std::shared_ptr<request_router> by, const protocol::request_line& r, relayed_path path,
                          relayed_bindings& place, binding::terms wanted, std::shared_ptr<call> answers, time_point due)
-    : deferred_request(std::move(by), std::move(answers), due), task_(r.noun.task), path_(std::move(path)), via_(r.via),
-      adverbs_(forwarded_adverbs(r, hops_after(r), routing_->host().name, path_.requester).text),
-      may_pass_on_(r.hops != 0), wants_mark_(r.wants_mark), place_(place), wanted_(wanted) {}
+    : deferred_request(std::move(by), std::move(answers), due), request_(r), path_(std::move(path)), place_(place),
+      wanted_(wanted) {}
 
-bool all_binding::may_bind_at(std::string_view node) const {
-    return permits(routing_->host(), path_.requester, node, verb::bind, path_.text);
+bool all_binding::may_bind_here() const {
+    const auto& host = routing_->host();
+    return permits(host, path_.by, host.name, verb::bind, path_.text);
+}
+
+passage all_binding::may_bind_at(std::string_view node) const {
+    return may_pass_on(routing_->host(), path_.by, node, verb::bind, path_.text);
 }
 
 bool all_binding::is_permitted() const {
-    return std::ranges::all_of(parts_, [this](const auto& entry) { return may_bind_at(entry.first); });
+    return std::ranges::all_of(parts_, [this](const auto& entry) {
+        const auto& [node, p] = entry;
+        return node == routing_->host().name ? may_bind_here() : p.held_back || may_bind_at(node) == passage::permitted;
+    });
 }
 
 bool all_binding::begin(time_point now) {
@@ -61,7 +68,7 @@ void all_binding::follow() {
     const auto self = shared_from_this();
     joining_ = true;
     const auto& host = routing_->host();
-    if (!parts_.contains(host.name) && core::offers(host, verb::bind, task_) && may_bind_at(host.name)) {
+    if (!parts_.contains(host.name) && core::offers(host, verb::bind, request_->noun.task) && may_bind_here()) {
         auto& own = parts_[host.name];
         own.asked = false;
         if (const auto* t = place_.take_own_part(path_.text, wanted_)) {
@@ -69,15 +76,15 @@ void all_binding::follow() {
             own.mark = t->last_mark();
         }
     }
-    if (may_pass_on_) {
+    if (request_->hops != 0) {
         std::vector<std::string> there;
-        for (const auto& o : routing_->offers(verb::bind, task_)) {
-            if (!is_in_via(via_, o.by->name) && may_bind_at(o.by->name)) {
+        for (const auto& o : routing_->offers(verb::bind, request_->noun.task)) {
+            if (!is_in_via(request_->via, o.by->name) && may_bind_at(o.by->name) != passage::not_permitted) {
                 there.push_back(o.by->name);
             }
         }
         for (const auto& name : there) {
-            if (!parts_.contains(name)) {
+            if (const auto known = parts_.find(name); known == parts_.end() || known->second.held_back) {
                 join(name);
             }
         }
@@ -93,8 +100,17 @@ void all_binding::follow() {
 }
 
 void all_binding::join(const std::string& node) {
-    parts_[node];
-    place_.from()->join(node, path_, adverbs_, weak_from_this(),
+    auto& p = parts_[node];
+    p = {};
+    protocol::failure refusal;
+    const auto permit = forwarding_permit::ask(routing_->host(), *request_, path_.by, node, refusal);
+    if (!permit) {
+        p.asked = false;
+        p.held_back = true;
+        p.failure = std::move(refusal);
+        return;
+    }
+    place_.from()->join(*permit, path_, weak_from_this(),
                         [this, weak = weak_from_this(), node](topic* t, std::string_view last,
                                                               const std::optional<update_mark>& mark,
                                                               const protocol::failure& why) {
@@ -147,7 +163,7 @@ void all_binding::answer() {
     }
     const auto self = shared_from_this();
     routing_->host().deadlines.disarm(*this);
-    aggregate_reply text{wants_mark_};
+    aggregate_reply text{request_->wants_mark};
     for (auto& [node, p] : parts_) {
         text.add(node, p);
         p.result.reset(); // not needed for the rest of the binding

@@ -7,6 +7,8 @@
 #include "node/routing/relays.hpp"
 #include "node/routing/request_router.hpp"
 #include "node/session/call.hpp"
+#include "node/session/request_checks.hpp"
+#include "protocol/request_line.hpp"
 
 #include <map>
 #include <memory>
@@ -35,11 +37,13 @@ class all_binding final : public deferred_request, private deadline {
 
   private:
     struct part : node_outcome {
-        bool asked = true;  // until it has replied
-        bool bound = false; // with a failure too, if there was no memory for its last value
+        bool asked = true;      // until it has replied
+        bool bound = false;     // with a failure too, if there was no memory for its last value
+        bool held_back = false; // this node may not forward for the requester
     };
 
-    [[nodiscard]] bool may_bind_at(std::string_view node) const;
+    [[nodiscard]] bool may_bind_here() const;
+    [[nodiscard]] passage may_bind_at(std::string_view node) const;
     void bind_known(time_point now);
     void join(const std::string& node);
     void on_result(const std::string& node, topic* t, std::string_view last, const std::optional<update_mark>& mark,
@@ -49,12 +53,8 @@ class all_binding final : public deferred_request, private deadline {
     void answer();
     void withdraw() override;
 
-    std::string task_;
+    protocol::owned_request request_;
     relayed_path path_;
-    std::string via_;
-    std::string adverbs_;
-    bool may_pass_on_;
-    bool wants_mark_;
     relayed_bindings& place_;
     binding::terms wanted_;
     std::map<std::string, part, std::less<>> parts_; // by node

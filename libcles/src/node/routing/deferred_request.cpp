@@ -48,7 +48,7 @@ void deferred_request::follow_call() {
 client_request::client_request(std::shared_ptr<request_router> by, const protocol::request_line& r,
                                const identity& peer, std::shared_ptr<call> answers, time_point due)
     : deferred_request(std::move(by), std::move(answers), due), request_(r), peer_(peer),
-      requester_(requester_of(routing_->host(), peer, r)) {}
+      origin_(origin_of(routing_->host(), peer, r)) {}
 
 // -- any ------------------------------------------------------------------------------------------------------------
 
@@ -56,8 +56,7 @@ bool any_request::begin(time_point now) {
     if (!retry_after_ && routing_->waits_for_discovery()) {
         return false;
     }
-    const auto chosen =
-        busy_ < max_busy ? routing_->choose(*request_, requester_, asked_, now) : load_balancer::chosen{};
+    const auto chosen = busy_ < max_busy ? routing_->choose(*request_, origin_, asked_, now) : load_balancer::chosen{};
     if (over()) { // the program's load function has stopped the service
         return true;
     }
@@ -65,7 +64,7 @@ bool any_request::begin(time_point now) {
         ask(chosen, now);
         return true;
     }
-    if (!retry_after_ && routing_->expects_more()) {
+    if (!retry_after_ && !chosen.not_forwarded && routing_->expects_more()) {
         return false;
     }
     if (auto pool = next_pool(); !pool.empty()) {
@@ -73,11 +72,14 @@ bool any_request::begin(time_point now) {
         ask_other(std::move(pool));
         return true;
     }
-    if (!retry_after_ && routing_->expects_nodes()) {
+    if (!retry_after_ && !chosen.not_forwarded && routing_->expects_nodes()) {
         return false;
     }
     if (retry_after_) {
         give_up(retry_after_->reported, retry_after_->may_have_started);
+    } else if (is_held_back(chosen)) {
+        call_->fail(no_passage(routing_->host(), passage::not_forwarded, origin_.requester, "any", request_->verb,
+                               request_->noun.task));
     } else {
         call_->fail(routing_->no_provider(*request_));
     }
@@ -98,7 +100,7 @@ void any_request::ask(const load_balancer::chosen& chosen, time_point now) {
 
 void any_request::ask_other(std::string node) {
     note_asked(std::move(node));
-    part_.ticket = routing_->send(*request_, requester_, asked_.back(), reply_due_, outcome(), progress_to(call_));
+    part_.ticket = routing_->send(*request_, origin_, asked_.back(), reply_due_, outcome(), progress_to(call_));
 }
 
 void any_request::note_asked(std::string node) {
@@ -115,16 +117,21 @@ subrequest_outcome any_request::outcome() {
 
 // "north.any" of a pool that was not asked; empty if all were.
 std::string any_request::next_pool() const {
-    if (!may_forward_for(routing_->host(), requester_)) {
-        return {};
-    }
-    for (const auto& pool : other_pools_for(routing_->host(), *request_, peer_)) {
+    const auto& r = *request_;
+    for (const auto& pool : other_pools_for(routing_->host(), r, peer_)) {
         auto target = pool.name + ".any";
-        if (pool.live && std::find(asked_.begin(), asked_.end(), target) == asked_.end()) {
+        if (pool.live && std::find(asked_.begin(), asked_.end(), target) == asked_.end() &&
+            may_pass_on(routing_->host(), origin_, target, r.verb, r.noun) == passage::permitted) {
             return target;
         }
     }
     return {};
+}
+
+// Whether nobody is asked only because this node may not forward for the requester.
+bool any_request::is_held_back(const load_balancer::chosen& chosen) const {
+    return chosen.not_forwarded || (!may_forward_for(routing_->host(), origin_.requester) &&
+                                    !other_pools_for(routing_->host(), *request_, peer_).empty());
 }
 
 void any_request::continue_after_local_refusal(const protocol::failure& why) {
@@ -223,13 +230,9 @@ bool scatter_gather::begin(time_point now) {
 bool scatter_gather::ask_known(time_point now) {
     routing_->host().deadlines.disarm(*this);
     const auto& r = *request_;
-    const auto add = [this, &r](const std::string& node) {
-        if (permits(routing_->host(), requester_, node, r.verb, r.noun)) {
-            parts_.emplace_back().node = node;
-        }
-    };
-    if (offers(routing_->host(), r.verb, r.noun.task)) {
-        add(routing_->host().name);
+    const auto& host = routing_->host();
+    if (offers(host, r.verb, r.noun.task) && permits(host, origin_, host.name, r.verb, r.noun)) {
+        parts_.emplace_back().node = host.name;
     }
     if (r.hops != 0) {
         for (const auto& o : routing_->offers(r.verb, r.noun.task)) {
@@ -255,17 +258,30 @@ bool scatter_gather::ask_known(time_point now) {
     return true;
 }
 
+// Another node, or "north.all" of a pool. Null if the requester may not ask it. If this node may not forward for the
+// requester, the reply says so.
+scatter_gather::part* scatter_gather::add(std::string node) {
+    const auto& r = *request_;
+    const auto found = may_pass_on(routing_->host(), origin_, node, r.verb, r.noun);
+    if (found == passage::not_permitted) {
+        return nullptr;
+    }
+    auto& added = parts_.emplace_back();
+    added.node = std::move(node);
+    if (found != passage::permitted) {
+        added.failure = no_passage(routing_->host(), found, origin_.requester, added.node, r.verb, r.noun.task);
+    }
+    return &added;
+}
+
 void scatter_gather::add_pools() {
     for (auto& pool : other_pools_for(routing_->host(), *request_, peer_)) {
-        auto& added = parts_.emplace_back();
-        added.node = pool.name + ".all";
-        added.pool = std::move(pool.name);
-        if (!may_forward_for(routing_->host(), requester_)) {
-            added.failure = protocol::failure{.code = errc::denied,
-                                              .message = may_not_forward(routing_->host(), requester_, added.node)};
-        } else if (!pool.live) {
-            added.failure = protocol::failure{.code = errc::unavailable,
-                                              .message = added.pool + " has no bridge that can be reached"};
+        if (auto* const added = add(pool.name + ".all")) {
+            added->pool = std::move(pool.name);
+            if (!added->failure && !pool.live) {
+                added->failure = protocol::failure{.code = errc::unavailable,
+                                                   .message = added->pool + " has no bridge that can be reached"};
+            }
         }
     }
 }
@@ -282,7 +298,7 @@ void scatter_gather::ask_all(time_point now) {
         if (at->node == routing_->host().name) {
             own = &*at;
         } else if (at->is_open()) {
-            at->ticket = routing_->send(*request_, requester_, at->node, by, then(*at));
+            at->ticket = routing_->send(*request_, origin_, at->node, by, then(*at));
         }
     }
     if (own != nullptr && !ended_) { // last, since its handler may do anything

@@ -9,6 +9,7 @@
 #include "node/routing/request_router.hpp"
 #include "node/routing/subrequest.hpp"
 #include "node/session/call.hpp"
+#include "port/request_origin.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -61,8 +62,8 @@ class client_request : public deferred_request {
 
   protected:
     protocol::owned_request request_;
-    const identity& peer_;        // valid until the call has ended
-    const std::string requester_; // whose rights apply
+    const identity& peer_;      // valid until the call has ended
+    const owned_origin origin_; // whose rights apply
 };
 
 /// A request for a client at one node.
@@ -94,6 +95,7 @@ class any_request final : public client_request {
     void note_asked(std::string node);
     [[nodiscard]] subrequest_outcome outcome();
     [[nodiscard]] std::string next_pool() const;
+    [[nodiscard]] bool is_held_back(const load_balancer::chosen& chosen) const;
     void on_outcome(std::string_view json, subrequest_failure* why);
     void try_next(subrequest_failure why);
     void give_up(protocol::failure why, bool may_have_started);
@@ -166,6 +168,7 @@ class scatter_gather final : public client_request, private deadline {
     void on_deadline(time_point now) override;
     /// Returns false if none is known, and seeds may still answer.
     bool ask_known(time_point now);
+    part* add(std::string node);
     void add_pools();
     void ask_all(time_point now);
     void follow();

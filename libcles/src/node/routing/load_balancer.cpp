@@ -41,13 +41,19 @@ bool offers(const node_state& n, verb v, std::string_view task) {
     return n.tasks.find(v, task) != nullptr;
 }
 
-void load_balancer::gather(const protocol::request_line& r, std::string_view requester,
+void load_balancer::gather(const protocol::request_line& r, const request_origin& by,
                            const std::vector<std::string>& asked) {
     const auto was_asked = [&](std::string_view name) {
         return std::find(asked.begin(), asked.end(), name) != asked.end();
     };
-    const auto may_ask = [&](std::string_view name) { return permits(node_, requester, name, r.verb, r.noun); };
-    const bool here = offers(node_, r.verb, r.noun.task) && !was_asked(node_.name) && may_ask(node_.name);
+    const auto may_ask = [&](std::string_view name) {
+        const auto found = may_pass_on(node_, by, name, r.verb, r.noun);
+        not_forwarded_ = not_forwarded_ || found == passage::not_forwarded;
+        return found == passage::permitted;
+    };
+    not_forwarded_ = false;
+    const bool here =
+        offers(node_, r.verb, r.noun.task) && !was_asked(node_.name) && permits(node_, by, node_.name, r.verb, r.noun);
     if (here) {
         here_.update_load(node_.load_now()); // before the list is built: the program's function may send requests
     }
@@ -66,9 +72,9 @@ void load_balancer::gather(const protocol::request_line& r, std::string_view req
     }
 }
 
-load_balancer::chosen load_balancer::choose(const protocol::request_line& r, std::string_view requester,
+load_balancer::chosen load_balancer::choose(const protocol::request_line& r, const request_origin& by,
                                             const std::vector<std::string>& asked, time_point now) {
-    gather(r, requester, asked);
+    gather(r, by, asked);
     at_once_.clear();
     std::copy_if(all_.begin(), all_.end(), std::back_inserter(at_once_),
                  [now](const candidate* c) { return c->avoid_until <= now; });
@@ -78,7 +84,7 @@ load_balancer::chosen load_balancer::choose(const protocol::request_line& r, std
     }
     auto* found = selector_.select(at_once_.empty() ? all_ : at_once_);
     if (found == nullptr) {
-        return {};
+        return {.not_forwarded = not_forwarded_};
     }
     if (found == &here_) {
         const auto* h = node_.tasks.find(r.verb, r.noun.task);

@@ -4,6 +4,7 @@
 #include "node/base/backoff.hpp"
 #include "node/node_state.hpp"
 #include "node/routing/service_registry.hpp"
+#include "port/request_origin.hpp"
 #include "protocol/request_line.hpp"
 
 #include <cstdint>
@@ -41,19 +42,20 @@ class load_balancer {
         known_node* other = nullptr; ///< null: this node, or none
         bool here = false;
         bool idempotent = false;
+        bool not_forwarded = false; ///< a node is left out only because this one may not forward for the requester
 
         [[nodiscard]] bool nobody() const noexcept { return other == nullptr && !here; }
     };
     /// Selects a live node that offers the task, is not in `via` and is not in `asked`. Busy and unreachable nodes are
     /// selected only if there are no others, and nodes with all workers on long jobs only if no node has a free worker.
-    /// Of a secured fleet, only nodes of which `requester` may request it.
-    [[nodiscard]] chosen choose(const protocol::request_line& r, std::string_view requester,
+    /// Of a secured fleet, only nodes of which the requester may request it, by this one.
+    [[nodiscard]] chosen choose(const protocol::request_line& r, const request_origin& by,
                                 const std::vector<std::string>& asked, time_point now);
     /// This node has refused work.
     void avoid_local(time_point until) noexcept { here_.avoid_until = until; }
 
   private:
-    void gather(const protocol::request_line& r, std::string_view requester, const std::vector<std::string>& asked);
+    void gather(const protocol::request_line& r, const request_origin& by, const std::vector<std::string>& asked);
 
     const node_state& node_;
     const service_registry& others_;
@@ -61,6 +63,7 @@ class load_balancer {
     candidate here_;
     std::vector<candidate*> all_;     // for the current request
     std::vector<candidate*> at_once_; // of these, the nodes not to be avoided
+    bool not_forwarded_ = false;      // one is left out for that
 };
 
 /// Whether this node offers the task.

@@ -40,6 +40,11 @@ void append_unknown(adverb_list& to, const protocol::request_line& r) {
     }
 }
 
+// The requester that `from` states. The peer of the next node is this one.
+std::string_view stated_requester(const request_origin& by, std::string_view own_name) noexcept {
+    return by.requester == own_name && by.forwarder.empty() ? std::string_view{} : by.requester;
+}
+
 // Updates that the publisher keeps for this node, which stands for many clients and must lose less than any of them.
 constexpr std::uint32_t upstream_keep = 1024;
 
@@ -56,17 +61,6 @@ protocol::failure failure_of(boost::system::error_code code, const std::string& 
     return why;
 }
 
-/// The value of the adverb with that key, such as "via="; empty: it is missing.
-std::string_view value_in(std::string_view adverbs, std::string_view key) {
-    protocol::part_reader parts{adverbs};
-    for (auto part = parts.next(); !part.empty(); part = parts.next()) {
-        if (part.starts_with(key)) {
-            return part.substr(key.size());
-        }
-    }
-    return {};
-}
-
 /// A noun of another node, bound for this node's clients.
 class upstream_feed final : private detail::pending_event, public std::enable_shared_from_this<upstream_feed> {
   public:
@@ -75,7 +69,7 @@ class upstream_feed final : private detail::pending_event, public std::enable_sh
                                            std::move(node), std::move(path), false, host_->environment().random()),
           to_(&to) {}
 
-    void begin(std::string_view adverbs);
+    void begin(const forwarding_permit& permit);
     void close();
 
   private:
@@ -95,15 +89,15 @@ class upstream_feed final : private detail::pending_event, public std::enable_sh
     feed_events* to_; // null: closed
 };
 
-void upstream_feed::begin(std::string_view adverbs) {
+void upstream_feed::begin(const forwarding_permit& permit) {
     host_->feeds().enter(machine_, weak_from_this(),
                          {.noun = machine_.target() + ":" + machine_.path(),
                           .at = {},
                           .keep = upstream_keep,
-                          .adverbs = std::string{adverbs},
+                          .adverbs = permit.adverbs(),
                           .marked = true,
-                          .via = std::string{value_in(adverbs, "via=")},
-                          .requester = std::string{value_in(adverbs, "from=")}});
+                          .via = std::string{permit.via()},
+                          .requester = std::string{permit.requester()}});
     wait();
     machine_.start(detail::pending_ptr{new peer_reply{[weak = weak_from_this()](const peer_answer& found) {
         if (const auto self = weak.lock()) {
@@ -165,26 +159,34 @@ class peer_next_hop : public next_hop {
   public:
     explicit peer_next_hop(local_node& host) noexcept : host_(host) {}
 
-    std::uint64_t send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
-                       outbound::progress_function progress, std::string_view via) override {
-        if (host_.stopped()) {
-            host_.fail_later(std::move(reply), errc::stopped, {});
-            return 0;
-        }
-        const auto requester = host_.node().security ? value_in(r.adverbs, "from=") : std::string_view{};
-        return host_.peer_channels().send({.target = r.target(), .by = {.via = via, .requester = requester}}, r,
-                                          deadline, std::move(reply), std::move(progress));
+    std::uint64_t forward(const forwarding_permit& permit, const protocol::outgoing_request& r, time_point deadline,
+                          detail::pending_ptr reply, outbound::progress_function progress) override {
+        return send(r, {.via = permit.via(), .requester = permit.requester()}, deadline, std::move(reply),
+                    std::move(progress));
+    }
+    std::uint64_t send_own(const protocol::outgoing_request& r, time_point deadline,
+                           detail::pending_ptr reply) override {
+        return send(r, {}, deadline, std::move(reply), {});
     }
     void cancel(std::uint64_t ticket) override { host_.cancel(ticket); }
-    std::shared_ptr<void> bind(std::string_view node, std::string_view path, std::string_view adverbs,
-                               feed_events& to) override {
-        const auto made =
-            std::make_shared<upstream_feed>(host_.shared_from_this(), std::string{node}, std::string{path}, to);
-        made->begin(adverbs);
+    std::shared_ptr<void> bind(const forwarding_permit& permit, std::string_view path, feed_events& to) override {
+        const auto made = std::make_shared<upstream_feed>(host_.shared_from_this(), std::string{permit.node()},
+                                                          std::string{path}, to);
+        made->begin(permit);
         return {static_cast<void*>(made.get()), [made](void*) { made->close(); }};
     }
 
   private:
+    std::uint64_t send(const protocol::outgoing_request& r, const forwarding& by, time_point deadline,
+                       detail::pending_ptr reply, outbound::progress_function progress) {
+        if (host_.stopped()) {
+            host_.fail_later(std::move(reply), errc::stopped, {});
+            return 0;
+        }
+        return host_.peer_channels().send({.target = r.target(), .by = by}, r, deadline, std::move(reply),
+                                          std::move(progress));
+    }
+
     local_node& host_;
 };
 
@@ -203,7 +205,7 @@ std::uint8_t hops_after(const protocol::request_line& r) noexcept {
 }
 
 adverb_list forwarded_adverbs(const protocol::request_line& r, std::uint8_t hops, std::string_view own_name,
-                              std::string_view requester) {
+                              const request_origin& by) {
     adverb_list out{.text = "hops=" + std::to_string(hops) + " via=", .count = 2};
     const auto add = [&](std::string_view key, std::string_view value) {
         out.text.append(key).append(value);
@@ -213,7 +215,7 @@ adverb_list forwarded_adverbs(const protocol::request_line& r, std::uint8_t hops
         out.text.append(r.via).push_back(',');
     }
     out.text.append(own_name);
-    if (!requester.empty() && requester != own_name) {
+    if (const auto requester = stated_requester(by, own_name); !requester.empty()) {
         add(" from=", requester);
     }
     if (!r.sig.empty()) {
@@ -221,6 +223,30 @@ adverb_list forwarded_adverbs(const protocol::request_line& r, std::uint8_t hops
     }
     append_unknown(out, r);
     return out;
+}
+
+std::optional<forwarding_permit> forwarding_permit::ask(const node_state& n, const protocol::request_line& r,
+                                                        const request_origin& by, std::string_view node,
+                                                        protocol::failure& why) {
+    const auto found = may_pass_on(n, by, node, r.verb, r.noun);
+    if (found != passage::permitted) {
+        why = no_passage(n, found, by.requester, node, r.verb, r.noun.task);
+        return std::nullopt;
+    }
+    return forwarding_permit{node, r.via, stated_requester(by, n.name),
+                             forwarded_adverbs(r, hops_after(r), n.name, by).text};
+}
+
+std::optional<forwarding_permit> forwarding_permit::ask(const node_state& n, const request_origin& by,
+                                                        std::string_view node, verb how, std::string_view path,
+                                                        std::string_view via, std::string adverbs,
+                                                        protocol::failure& why) {
+    const auto found = may_pass_on(n, by, node, how, path);
+    if (found != passage::permitted) {
+        why = no_passage(n, found, by.requester, node, how, path.substr(0, path.find('/')));
+        return std::nullopt;
+    }
+    return forwarding_permit{node, via, stated_requester(by, n.name), std::move(adverbs)};
 }
 
 bool has_adverbs_to_forward(const protocol::request_line& r) noexcept {

@@ -11,8 +11,8 @@ namespace cles::core {
 
 std::string relayed_path::key(std::string_view node) const {
     auto made = std::string{node}.append(":").append(text);
-    if (!requester.empty()) {
-        made.append(" from=").append(requester);
+    if (!by.requester.empty()) {
+        made.append(" from=").append(by.requester);
     }
     return made;
 }
@@ -28,8 +28,8 @@ class relays::relay final : public feed_events {
     relay(const relay&) = delete;
     relay& operator=(const relay&) = delete;
 
-    void start(std::string_view node, std::string_view path, std::string_view adverbs) {
-        upstream_ = owner_.out_.bind(node, path, adverbs, *this);
+    void start(const forwarding_permit& permit, std::string_view path) {
+        upstream_ = owner_.out_.bind(permit, path, *this);
     }
     void stop() { upstream_.reset(); }
     void join(const std::weak_ptr<const void>& whose, result_callback done) {
@@ -122,9 +122,9 @@ void relays::stop() {
     }
 }
 
-void relays::join(std::string_view node, const relayed_path& path, std::string_view adverbs,
-                  const std::weak_ptr<const void>& whose, result_callback done) {
-    const auto noun = path.key(node);
+void relays::join(const forwarding_permit& permit, const relayed_path& path, const std::weak_ptr<const void>& whose,
+                  result_callback done) {
+    const auto noun = path.key(permit.node());
     auto at = all_.find(noun);
     if (at != all_.end()) {
         at->second->join(whose, std::move(done));
@@ -140,7 +140,7 @@ void relays::join(std::string_view node, const relayed_path& path, std::string_v
     }
     at = all_.emplace(noun, std::make_unique<relay>(*this, noun)).first;
     at->second->join(whose, std::move(done));
-    at->second->start(node, path.text, adverbs);
+    at->second->start(permit, path.text);
 }
 
 topic* relays::find(std::string_view noun) noexcept {
@@ -157,16 +157,16 @@ void relays::release(topic& t) {
 
 relayed_bindings::~relayed_bindings() { clear(); }
 
-void relayed_bindings::bind(std::string_view node, const relayed_path& path, std::string_view adverbs,
-                            binding::terms wanted, bool wants_mark, const std::shared_ptr<call>& c) {
+void relayed_bindings::bind(const forwarding_permit& permit, const relayed_path& path, binding::terms wanted,
+                            bool wants_mark, const std::shared_ptr<call>& c) {
     std::erase_if(asking_, [](const asking& a) {
         const auto waits = a.answers.lock();
         return !waits || waits->ended();
     });
-    const named noun{path.key(node), std::string{node}, path};
+    const named noun{path.key(permit.node()), std::string{permit.node()}, path};
     asking_.push_back({noun.key, c});
     from_->join(
-        node, path, adverbs, c,
+        permit, path, c,
         [this, weak = std::weak_ptr{c}, wanted, wants_mark,
          noun](topic* t, std::string_view last, const std::optional<update_mark>& mark, const protocol::failure& why) {
             const auto waits = weak.lock();
@@ -204,7 +204,7 @@ bool relayed_bindings::is_by_name(std::string_view key) const {
 std::vector<std::pair<std::string, relayed_path>> relayed_bindings::forbidden(const node_state& host) const {
     std::vector<std::pair<std::string, relayed_path>> found;
     for (const auto& each : by_name_) {
-        if (!permits(host, each.path.requester, each.node, verb::bind, each.path.text)) {
+        if (may_pass_on(host, each.path.by, each.node, verb::bind, each.path.text) != passage::permitted) {
             found.emplace_back(each.node, each.path);
         }
     }

@@ -6,6 +6,7 @@
 #include "node/publish/topic.hpp"
 #include "node/routing/next_hop.hpp"
 #include "node/session/call.hpp"
+#include "port/request_origin.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -23,7 +24,7 @@ namespace cles::core {
 /// A path of another node, bound for a client.
 struct relayed_path {
     std::string text;
-    std::string requester{}; ///< in a secured fleet, the member whose rights apply
+    owned_origin by{}; ///< in a secured fleet, whose rights apply
 
     // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the resulting zero for a pointer
     auto operator<=>(const relayed_path&) const = default;
@@ -46,8 +47,8 @@ class relays final : public topic_source {
     using result_callback = std::function<void(topic*, std::string_view last, const std::optional<update_mark>& mark,
                                                const protocol::failure& why)>;
     /// Binds a noun. Calls `done` once, at once if the noun is bound already, and not if `whose` has expired.
-    void join(std::string_view node, const relayed_path& path, std::string_view adverbs,
-              const std::weak_ptr<const void>& whose, result_callback done);
+    void join(const forwarding_permit& permit, const relayed_path& path, const std::weak_ptr<const void>& whose,
+              result_callback done);
 
     [[nodiscard]] topic* find(std::string_view noun) noexcept override;
     void release(topic& t) override;
@@ -76,8 +77,8 @@ class relayed_bindings {
     ~relayed_bindings();
 
     /// Binds a noun of another node, and replies when that node has. A further BIND changes the terms.
-    void bind(std::string_view node, const relayed_path& path, std::string_view adverbs, binding::terms wanted,
-              bool wants_mark, const std::shared_ptr<call>& c);
+    void bind(const forwarding_permit& permit, const relayed_path& path, binding::terms wanted, bool wants_mark,
+              const std::shared_ptr<call>& c);
     /// Binds a noun of all its publishers from now on. Returns the previous binding of that noun, to be closed.
     std::shared_ptr<all_binding> bind_all(const relayed_path& path, std::shared_ptr<all_binding> all) {
         return std::exchange(all_[path], std::move(all));
@@ -85,7 +86,7 @@ class relayed_bindings {
     /// Ends a binding, or a BIND that is still in progress.
     void unbind(std::string_view target, const relayed_path& path);
     void clear();
-    /// Those whose requesters may no longer bind them: targets and paths.
+    /// Those that this node may no longer pass on: targets and paths.
     [[nodiscard]] std::vector<std::pair<std::string, relayed_path>> forbidden(const node_state& host) const;
     void drain(time_point now) { bound_.drain(now); }
     [[nodiscard]] bool binds(std::string_view target, const relayed_path& path);

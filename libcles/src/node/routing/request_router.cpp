@@ -37,9 +37,9 @@ void request_router::stop() {
 bool request_router::route(const protocol::request_line& r, const identity& peer, time_point due, time_point now,
                            inbound& from) {
     const auto target = r.noun.target;
-    const auto requester = requester_of(*node_, peer, r);
+    const auto by = origin_of(*node_, peer, r);
     if (target == "any" && !waits_for_discovery_) {
-        const auto chosen = load_balancer_.choose(r, requester, {}, now);
+        const auto chosen = load_balancer_.choose(r, by, {}, now);
         if (chosen.here && runs_in_line(r)) {
             return false;
         }
@@ -61,16 +61,16 @@ bool request_router::route(const protocol::request_line& r, const identity& peer
     } else if (r.hops == 0) {
         c->fail(no_hops_left(r));
     } else {
-        forward(r, requester, std::move(c), due);
+        forward(r, by, std::move(c), due);
     }
     return true;
 }
 
 // Reply, progress and cancellation are forwarded too.
-void request_router::forward(const protocol::request_line& r, std::string_view requester, std::shared_ptr<call> c,
+void request_router::forward(const protocol::request_line& r, const request_origin& by, std::shared_ptr<call> c,
                              time_point due) {
     const auto ticket = send(
-        r, requester, r.noun.target, due,
+        r, by, r.noun.target, due,
         [c, node = std::string{r.noun.target}](std::string_view json, subrequest_failure* why) {
             if (why == nullptr) {
                 c->done(json);
@@ -82,12 +82,18 @@ void request_router::forward(const protocol::request_line& r, std::string_view r
     c->on_stop([self = shared_from_this(), ticket] { self->out_.cancel(ticket); });
 }
 
-std::uint64_t request_router::send(const protocol::request_line& r, std::string_view requester, std::string_view node,
+std::uint64_t request_router::send(const protocol::request_line& r, const request_origin& by, std::string_view node,
                                    time_point due, subrequest_outcome then, outbound::progress_function progress) {
+    subrequest_failure why{.reported = {}, .may_have_started = false};
+    const auto permit = forwarding_permit::ask(*node_, r, by, node, why.reported);
+    if (!permit) {
+        then({}, &why);
+        return 0;
+    }
     const auto noun = std::string{node}.append(":").append(r.noun.path);
-    const auto adverbs = forwarded_adverbs(r, hops_after(r), node_->name, requester).text;
-    return out_.send({.verb = r.verb, .noun = noun, .carried = r.carried(), .adverbs = adverbs, .body = r.body}, due,
-                     detail::pending_ptr{new subrequest(std::move(then))}, std::move(progress), r.via);
+    return out_.forward(
+        *permit, {.verb = r.verb, .noun = noun, .carried = r.carried(), .adverbs = permit->adverbs(), .body = r.body},
+        due, detail::pending_ptr{new subrequest(std::move(then))}, std::move(progress));
 }
 
 void request_router::cancel(const attempt& part) {
@@ -106,7 +112,7 @@ void request_router::continue_after_busy(const protocol::request_line& r, const 
     }
 }
 
-void request_router::bind(const protocol::request_line& r, std::string_view requester, relayed_bindings& place,
+void request_router::bind(const protocol::request_line& r, const request_origin& by, relayed_bindings& place,
                           time_point due, time_point now, inbound& from) {
     const auto c = from.make_call(r, due, now);
     if (!c) {
@@ -114,7 +120,7 @@ void request_router::bind(const protocol::request_line& r, std::string_view requ
     }
     const binding::terms wanted{.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep};
     std::string scratch;
-    const relayed_path path{std::string{protocol::canonical_path(r.noun, scratch)}, std::string{requester}};
+    const relayed_path path{std::string{protocol::canonical_path(r.noun, scratch)}, by};
     if (r.noun.target == "all") {
         const auto all = std::make_shared<all_binding>(shared_from_this(), r, path, place, wanted, c, due);
         const auto before = place.bind_all(path, all);
@@ -129,8 +135,12 @@ void request_router::bind(const protocol::request_line& r, std::string_view requ
     } else if (r.hops == 0) {
         c->fail(no_hops_left(r));
     } else {
-        place.bind(r.noun.target, path, forwarded_adverbs(r, hops_after(r), node_->name, requester).text, wanted,
-                   r.wants_mark, c);
+        protocol::failure why;
+        if (const auto permit = forwarding_permit::ask(*node_, r, by, r.noun.target, why)) {
+            place.bind(*permit, path, wanted, r.wants_mark, c);
+        } else {
+            c->fail(why);
+        }
     }
 }
 

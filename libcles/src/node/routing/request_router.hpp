@@ -39,29 +39,30 @@ class request_router : public router, public std::enable_shared_from_this<reques
                inbound& from) override;
     void continue_after_busy(const protocol::request_line& request, const identity& peer, const protocol::failure& why,
                              time_point due, time_point now, inbound& from) override;
-    void bind(const protocol::request_line& request, std::string_view requester, relayed_bindings& place,
-              time_point due, time_point now, inbound& from) override;
+    void bind(const protocol::request_line& request, const request_origin& by, relayed_bindings& place, time_point due,
+              time_point now, inbound& from) override;
     std::shared_ptr<relays> relayed() override { return relays_; }
     [[nodiscard]] const service_registry& registry() const noexcept override { return service_registry_; }
     void hold() noexcept override { waits_for_discovery_ = true; }
     void release(bool expects_nodes) override;
+    void on_rights_changed() override { on_offers(); }
     void begin_ready(time_point now) override;
     void stop() final;
 
     // For deferred requests.
     [[nodiscard]] node_state& host() noexcept { return *node_; }
-    [[nodiscard]] load_balancer::chosen choose(const protocol::request_line& r, std::string_view requester,
+    [[nodiscard]] load_balancer::chosen choose(const protocol::request_line& r, const request_origin& by,
                                                const std::vector<std::string>& asked, time_point now) {
-        return load_balancer_.choose(r, requester, asked, now);
+        return load_balancer_.choose(r, by, asked, now);
     }
     void avoid_local(time_point until) noexcept { load_balancer_.avoid_local(until); }
     [[nodiscard]] known_node* find(std::string_view name) noexcept { return service_registry_.find(name); }
     [[nodiscard]] const std::vector<service_registry::offer>& offers(verb v, std::string_view task) const {
         return service_registry_.offers(v, task);
     }
-    /// Sends `r` of `requester` to another node. Returns a ticket.
-    std::uint64_t send(const protocol::request_line& r, std::string_view requester, std::string_view node,
-                       time_point due, subrequest_outcome then, outbound::progress_function progress = {});
+    /// Sends `r`, of that origin, to another node. Returns a ticket; 0 if it may not leave: `then` is called at once.
+    std::uint64_t send(const protocol::request_line& r, const request_origin& by, std::string_view node, time_point due,
+                       subrequest_outcome then, outbound::progress_function progress = {});
     /// Cancels it, if it is still in progress.
     void cancel(const attempt& part);
     /// Has `e` started in the next turn, and owns it until then.
@@ -80,7 +81,7 @@ class request_router : public router, public std::enable_shared_from_this<reques
   private:
     void on_offers();
     void begin(std::shared_ptr<deferred_request> e, time_point now);
-    void forward(const protocol::request_line& r, std::string_view requester, std::shared_ptr<call> c, time_point due);
+    void forward(const protocol::request_line& r, const request_origin& by, std::shared_ptr<call> c, time_point due);
     bool runs_in_line(const protocol::request_line& r) const;
 
     std::shared_ptr<node_state> node_;

@@ -4,11 +4,11 @@
 #include <cles/identity.hpp>
 #include <cles/limits.hpp>
 
+#include "port/request_origin.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <memory>
-#include <string_view>
 
 namespace cles::core {
 
@@ -35,9 +35,9 @@ class router {
     /// This node was to serve a request in line but was `busy`, so it has not started: continues with another node.
     virtual void continue_after_busy(const protocol::request_line& request, const identity& peer,
                                      const protocol::failure& why, time_point due, time_point now, inbound& from) = 0;
-    /// Like `route`, for BIND of `requester`. `place` contains the bindings of the link's peer, and lives as long as
+    /// Like `route`, for BIND of that origin. `place` contains the bindings of the link's peer, and lives as long as
     /// the call.
-    virtual void bind(const protocol::request_line& request, std::string_view requester, relayed_bindings& place,
+    virtual void bind(const protocol::request_line& request, const request_origin& by, relayed_bindings& place,
                       time_point due, time_point now, inbound& from) = 0;
     /// The source of the relayed bindings.
     virtual std::shared_ptr<relays> relayed() = 0;
@@ -50,6 +50,8 @@ class router {
     /// Discovery is over. `expects_nodes`: except that seeds may still answer, for which requests wait that no known
     /// node serves.
     virtual void release(bool expects_nodes) = 0;
+    /// Members may do more than before: what they may bind now is bound.
+    virtual void on_rights_changed() = 0;
     /// Starts the requests that are ready. Call it in a turn, since handlers of this node run.
     virtual void begin_ready(time_point now) = 0;
     /// Sends no more requests.

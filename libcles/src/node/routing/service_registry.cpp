@@ -239,8 +239,8 @@ void service_registry::ask(time_point now) {
                 (*alive)->on_reply(name, ticket, json, why);
             }
         };
-        out_.send({.verb = verb::pull, .noun = n.name + ":cles"}, now + answer_within,
-                  detail::pending_ptr{new subrequest(std::move(then))}, {}, {});
+        out_.send_own({.verb = verb::pull, .noun = n.name + ":cles"}, now + answer_within,
+                      detail::pending_ptr{new subrequest(std::move(then))});
     }
     follow();
 }

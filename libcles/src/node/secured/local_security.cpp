@@ -4,6 +4,7 @@
 #include "node/local_node.hpp"
 #include "node/membership/gossip.hpp"
 #include "node/routing/other_pools.hpp"
+#include "node/routing/router.hpp"
 #include "node/secured/roster_exchange.hpp"
 #include "protocol/request_line.hpp"
 
@@ -39,6 +40,9 @@ void local_security::apply_change() {
     }
     if (auto* const routes = node.gossip_responder) {
         routes->reach().on_rights_changed();
+    }
+    if (node.active_router != nullptr) {
+        node.active_router->on_rights_changed();
     }
     host_.discovery().expedite_announcement();
 }

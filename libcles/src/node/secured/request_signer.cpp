@@ -51,7 +51,7 @@ bool may_sign_for(local_node& host, const repeatable_request& r, const std::stri
     }
     const auto member = member_of(host.node(), r.target);
     if (member == "any" || member == "all") {
-        return permits(host.node(), own, node, r.how, r.path);
+        return permits(host.node(), {.requester = own}, node, r.how, r.path);
     }
     return node == member;
 }

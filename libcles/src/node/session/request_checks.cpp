@@ -17,13 +17,29 @@ bool is_in_via(std::string_view via, std::string_view name) {
     return protocol::any_in_via(via, [name](std::string_view node) { return node == name; });
 }
 
-std::string_view requester_of(const node_state& n, const identity& peer, const protocol::request_line& r) {
+namespace {
+
+// Who it is at the other end of a link of a secured node.
+std::string_view member_at(const node_state& n, const identity& peer) {
+    return peer.transport == "inproc" ? std::string_view{n.name} : peer.name;
+}
+
+std::string not_allowed(const node_state& n, verb how, std::string_view task) {
+    return n.name + " does not allow " + std::string{to_string(how)} + " '" + std::string{task} + "'";
+}
+
+} // namespace
+
+request_origin origin_of(const node_state& n, const identity& peer, const protocol::request_line& r) {
     if (!n.security) {
         return {};
     }
-    const std::string_view by = peer.transport == "inproc" ? std::string_view{n.name} : peer.name;
-    const bool states_another = !by.empty() && !r.from.empty() && r.from != by;
-    return states_another && n.security->may_forward(by, r.from) ? r.from : by;
+    const auto by = member_at(n, peer);
+    if (r.from.empty()) {
+        return {.requester = by};
+    }
+    return n.security->may_forward(by, r.from) ? request_origin{.requester = r.from, .forwarder = by}
+                                               : request_origin{};
 }
 
 std::string_view member_of(const node_state& n, std::string_view target) {
@@ -34,17 +50,17 @@ std::string_view member_of(const node_state& n, std::string_view target) {
     return n.security->is_member(rest) || protocol::is_reserved_target(rest) ? rest : target;
 }
 
-bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
+bool permits(const node_state& n, const request_origin& by, std::string_view provider, verb how,
              const protocol::noun_view& noun) {
     if (!n.security) {
         return true;
     }
     const auto member = member_of(n, provider);
     const bool is_group_elsewhere = member.size() != provider.size() && protocol::is_reserved_target(member);
-    return is_group_elsewhere || n.security->allows(requester, member, how, noun);
+    return is_group_elsewhere || n.security->allows(by, member, how, noun);
 }
 
-bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
+bool permits(const node_state& n, const request_origin& by, std::string_view provider, verb how,
              std::string_view path) {
     if (!n.security) {
         return true;
@@ -52,20 +68,38 @@ bool permits(const node_state& n, std::string_view requester, std::string_view p
     protocol::noun_view noun;
     std::string why;
     const auto whole = std::string{provider}.append(":").append(path);
-    return protocol::parse_noun(whole, noun, why) && permits(n, requester, provider, how, noun);
+    return protocol::parse_noun(whole, noun, why) && permits(n, by, provider, how, noun);
 }
 
 bool may_forward_for(const node_state& n, std::string_view requester) {
     return !n.security || requester == n.name || n.security->may_forward(n.name, requester);
 }
 
+passage may_pass_on(const node_state& n, const request_origin& by, std::string_view node, verb how,
+                    const protocol::noun_view& noun) {
+    return !permits(n, by, node, how, noun)    ? passage::not_permitted
+           : !may_forward_for(n, by.requester) ? passage::not_forwarded
+                                               : passage::permitted;
+}
+
+passage may_pass_on(const node_state& n, const request_origin& by, std::string_view node, verb how,
+                    std::string_view path) {
+    return !permits(n, by, node, how, path)    ? passage::not_permitted
+           : !may_forward_for(n, by.requester) ? passage::not_forwarded
+                                               : passage::permitted;
+}
+
 std::string how_to_permit_forwarding(std::string_view forwarder, std::string_view requester) {
     return "(cles fleet rights " + std::string{forwarder} + " --forwards " + std::string{requester} + ")";
 }
 
-std::string may_not_forward(const node_state& n, std::string_view requester, std::string_view target) {
-    return n.name + " may not forward requests of " + std::string{requester} + " to " + std::string{target} + " " +
-           how_to_permit_forwarding(n.name, requester);
+protocol::failure no_passage(const node_state& n, passage why, std::string_view requester, std::string_view node,
+                             verb how, std::string_view task) {
+    return {.code = errc::denied,
+            .message = why == passage::not_forwarded
+                           ? n.name + " may not forward requests of " + std::string{requester} + " to " +
+                                 std::string{node} + " " + how_to_permit_forwarding(n.name, requester)
+                           : not_allowed(n, how, task)};
 }
 
 namespace {
@@ -82,32 +116,38 @@ bool is_exempt(const protocol::noun_view& noun) noexcept {
 
 // For `any` and `all`, the rights are checked for each node that is asked.
 bool is_permitted(const node_state& n, const identity& peer, const protocol::request_line& r) {
-    const auto requester = requester_of(n, peer, r);
-    if (requester.empty() || !n.security->is_member(requester)) {
+    const auto by = origin_of(n, peer, r);
+    if (by.requester.empty() || !n.security->is_member(by.requester)) {
         return false;
     }
-    // What a bridge forwards has the rights of the requester that it states, or none.
-    if (peer.transport == "pool" && !r.from.empty() && r.from != requester) {
-        return false;
-    }
-    if (is_exempt(r.noun) || r.noun.target == "any" || r.noun.target == "all") {
+    if (protocol::is_reserved_target(r.noun.target) && r.noun.target != "self") {
         return true;
     }
-    if (is_local_target(n, r)) {
-        return permits(n, requester, n.name, r.verb, r.noun);
-    }
-    return permits(n, requester, r.noun.target, r.verb, r.noun) && may_forward_for(n, requester);
+    return is_local_target(n, r) ? is_exempt(r.noun) || permits(n, by, n.name, r.verb, r.noun)
+                                 : may_pass_on(n, by, r.noun.target, r.verb, r.noun) == passage::permitted;
 }
 
-// Why it is denied. A lack of the right to forward is the node's own, not the requester's, so it is named.
-std::string denial(const node_state& n, const identity& peer, const protocol::request_line& r) {
-    const auto requester = requester_of(n, peer, r);
-    const bool is_for_another =
-        !requester.empty() && !protocol::is_reserved_target(r.noun.target) && !is_local_target(n, r);
-    if (is_for_another && n.security->is_member(requester) && !may_forward_for(n, requester)) {
-        return may_not_forward(n, requester, r.noun.target);
+// Why it is denied. A lack of the right to forward is not the requester's fault, so it is named.
+protocol::failure denial(const node_state& n, const identity& peer, const protocol::request_line& r) {
+    if (n.security) {
+        const auto by = origin_of(n, peer, r);
+        if (by.requester.empty() && !r.from.empty()) {
+            const std::string stated{r.from};
+            const std::string forwarder{member_at(n, peer)};
+            return {.code = errc::denied,
+                    .message = n.security->is_member(stated)
+                                   ? n.name + ": " + (forwarder.empty() ? "the peer" : forwarder) +
+                                         " may not forward requests of " + stated +
+                                         (forwarder.empty() ? "" : " " + how_to_permit_forwarding(forwarder, stated))
+                                   : n.name + ": '" + stated + "', the requester that is stated, is not a member"};
+        }
+        if (n.security->is_member(by.requester) && !protocol::is_reserved_target(r.noun.target) &&
+            !is_local_target(n, r)) {
+            return no_passage(n, may_pass_on(n, by, r.noun.target, r.verb, r.noun), by.requester, r.noun.target, r.verb,
+                              r.noun.task);
+        }
     }
-    return n.name + " does not allow " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.task} + "'";
+    return {.code = errc::denied, .message = not_allowed(n, r.verb, r.noun.task)};
 }
 
 } // namespace
@@ -125,8 +165,9 @@ bool allows(const node_state& n, const identity& peer, const protocol::request_l
     };
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);
+    const auto by = origin_of(n, peer, r);
     try {
-        return n.authorise({peer, r.verb, r.noun.task, path});
+        return n.authorise({peer, r.verb, r.noun.task, path, by.requester, by.forwarder});
     } catch (const std::exception& thrown) {
         const auto why = std::string{"denied, because the access rules threw an exception: "} + thrown.what();
         log_error(why);
@@ -146,7 +187,7 @@ std::optional<protocol::failure> refusal_reason(const node_state& n, const ident
         return protocol::failure{.code = code, .message = std::move(message)};
     };
     if (!allows(n, peer, r)) {
-        return object(errc::denied, denial(n, peer, r));
+        return denial(n, peer, r);
     }
     // A request for the reserved task other than PULL concerns the link it arrives on, such as an id to cancel.
     const bool stays = n.active_router == nullptr || (r.noun.task == "cles" && r.verb != verb::pull);

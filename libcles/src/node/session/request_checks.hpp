@@ -4,6 +4,7 @@
 #include <cles/identity.hpp>
 
 #include "node/node_state.hpp"
+#include "port/request_origin.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -36,25 +37,44 @@ using protocol::failure_text;
 /// Whether `name` is in the comma-separated list `via`.
 bool is_in_via(std::string_view via, std::string_view name);
 
-/// Whose rights apply to a request: those of the requester that a forwarder states, if the peer may forward for it;
-/// else the peer's. Empty if it is no member, and without security.
-std::string_view requester_of(const node_state& n, const identity& peer, const protocol::request_line& request);
+/// Whose a request is: that of the member that it states with `from`, if the peer may forward for that one; the peer's
+/// if it states none. Nobody's if the peer may not state that member, or is not authenticated itself; and without
+/// security. Views of `n`, `peer` and `request`.
+request_origin origin_of(const node_state& n, const identity& peer, const protocol::request_line& request);
+/// The member whose rights apply to it.
+inline std::string_view requester_of(const node_state& n, const identity& peer, const protocol::request_line& request) {
+    return origin_of(n, peer, request).requester;
+}
 
 /// The member of a secured fleet that is meant: "car1" of "north.car1", which is a node of another pool.
 std::string_view member_of(const node_state& n, std::string_view target);
 
-/// Whether `requester` may send `provider` a request for this noun. True without security. For `any` and `all` of
+/// Whether that one may send `provider` a request for this noun. True without security. For `any` and `all` of
 /// another pool, the rights are checked there, for each node.
-bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
+bool permits(const node_state& n, const request_origin& by, std::string_view provider, verb how,
              const protocol::noun_view& noun);
 /// The same for a path of `provider`, such as that of a topic.
-bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
-             std::string_view path);
+bool permits(const node_state& n, const request_origin& by, std::string_view provider, verb how, std::string_view path);
+
+/// Whether a client's request may leave this node for another one.
+enum class passage : std::uint8_t {
+    permitted,
+    not_permitted, ///< the requester may not send it to that node
+    not_forwarded, ///< this node may not forward for the requester
+};
+/// Decides that for every way on which a request can leave: by name, as a part of `any` or `all`, a binding, a job that
+/// moves, to another pool. Only a `forwarding_permit` (node/routing/next_hop.hpp), which asks this, lets one leave.
+passage may_pass_on(const node_state& n, const request_origin& by, std::string_view node, verb how,
+                    const protocol::noun_view& noun);
+/// The same for a path of that node.
+passage may_pass_on(const node_state& n, const request_origin& by, std::string_view node, verb how,
+                    std::string_view path);
+/// Why it may not leave: "car1 may not forward requests of sat1 to car2 (...)".
+[[gnu::cold]] protocol::failure no_passage(const node_state& n, passage why, std::string_view requester,
+                                           std::string_view node, verb how, std::string_view task);
 
 /// Whether this node may forward for the requester; itself, and without security, for all.
 bool may_forward_for(const node_state& n, std::string_view requester);
-/// That this node lacks that right: "car1 may not forward requests of sat1 to car2 (...)".
-[[gnu::cold]] std::string may_not_forward(const node_state& n, std::string_view requester, std::string_view target);
 /// How to permit that a node forwards for another one: "(cles fleet rights car1 --forwards sat1)".
 [[gnu::cold]] std::string how_to_permit_forwarding(std::string_view forwarder, std::string_view requester);
 

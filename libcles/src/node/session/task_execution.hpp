@@ -6,6 +6,7 @@
 #include <cles/task_info.hpp>
 
 #include "node/base/memory_budget.hpp"
+#include "port/request_origin.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -145,6 +146,7 @@ class task_execution {
     const handler* handler_; // null: not found
     decoded_parameters parameters_;
     const std::string trace_; // empty: none
+    const request_origin origin_;
     detail::request_data data_;
     const request request_;
     std::string path_;

@@ -5,6 +5,7 @@
 #include <cles/limits.hpp>
 #include <cles/task_info.hpp>
 
+#include "port/request_origin.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -23,24 +24,27 @@ class reply_writer;
 class movable_request {
   public:
     struct parts {
-        std::string_view path;      ///< of its noun
-        std::string_view via;       ///< the nodes that have forwarded it
-        std::string_view requester; ///< in a secured fleet, whose rights apply
-        std::string_view adverbs;   ///< as forwarded; empty: it has none of its own
-        std::size_t size = 0;       ///< of its line
+        std::string_view path;    ///< of its noun
+        std::string_view via;     ///< the nodes that have forwarded it
+        request_origin by;        ///< in a secured fleet, whose it is
+        std::string_view adverbs; ///< as forwarded; empty: it has none of its own
+        std::size_t size = 0;     ///< of its line
     };
 
     explicit movable_request(const parts& of)
         : via_at_(static_cast<std::uint32_t>(of.path.size())),
           requester_at_(static_cast<std::uint32_t>(via_at_ + of.via.size())),
-          adverbs_at_(static_cast<std::uint32_t>(requester_at_ + of.requester.size())), size_(of.size) {
+          forwarder_at_(static_cast<std::uint32_t>(requester_at_ + of.by.requester.size())),
+          adverbs_at_(static_cast<std::uint32_t>(forwarder_at_ + of.by.forwarder.size())), size_(of.size) {
         text_.reserve(adverbs_at_ + of.adverbs.size());
-        text_.append(of.path).append(of.via).append(of.requester).append(of.adverbs);
+        text_.append(of.path).append(of.via).append(of.by.requester).append(of.by.forwarder).append(of.adverbs);
     }
 
     [[nodiscard]] std::string_view path() const noexcept { return part(0, via_at_); }
     [[nodiscard]] std::string_view via() const noexcept { return part(via_at_, requester_at_); }
-    [[nodiscard]] std::string_view requester() const noexcept { return part(requester_at_, adverbs_at_); }
+    [[nodiscard]] request_origin origin() const noexcept {
+        return {.requester = part(requester_at_, forwarder_at_), .forwarder = part(forwarder_at_, adverbs_at_)};
+    }
     [[nodiscard]] std::string_view adverbs() const noexcept { return part(adverbs_at_, text_.size()); }
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
 
@@ -52,6 +56,7 @@ class movable_request {
     std::string text_;
     std::uint32_t via_at_;
     std::uint32_t requester_at_;
+    std::uint32_t forwarder_at_;
     std::uint32_t adverbs_at_;
     std::size_t size_;
 };

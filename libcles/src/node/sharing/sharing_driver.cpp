@@ -31,9 +31,12 @@ class sharing_driver final : private work_sharing::client, public work_sharing {
         return other.live && other.reachable() && (routes == nullptr || !routes->reach().is_beyond(other.name)) &&
                !host_.peer_channels().is_by_datagram(other.name);
     }
-    std::uint64_t send(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
-                       outbound::progress_function progress) override {
-        return host_.peer_channels().send({.target = r.target()}, r, due, std::move(reply), std::move(progress));
+    std::uint64_t forward(const forwarding_permit& permit, const protocol::outgoing_request& r, time_point due,
+                          detail::pending_ptr reply, outbound::progress_function progress) override {
+        return host_.peer_channels().send({.target = permit.node()}, r, due, std::move(reply), std::move(progress));
+    }
+    void send_own(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply) override {
+        host_.peer_channels().send({.target = r.target()}, r, due, std::move(reply), {});
     }
     void cancel(std::uint64_t ticket) override { host_.cancel(ticket); }
     std::uint32_t random() override { return host_.environment().random(); }

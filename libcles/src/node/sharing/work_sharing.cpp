@@ -64,13 +64,13 @@ std::optional<movable_request> work_sharing::movable(const protocol::request_lin
         task.must_be_signed) {
         return std::nullopt;
     }
-    const auto requester = requester_of(node_, peer, r);
-    if (!may_forward_for(requester)) {
+    const auto by = origin_of(node_, peer, r);
+    if (!may_forward_for(by.requester)) {
         return std::nullopt;
     }
     adverb_list adverbs;
     if (has_adverbs_to_forward(r)) {
-        adverbs = forwarded_adverbs(r, 0, node_.name, requester);
+        adverbs = forwarded_adverbs(r, 0, node_.name, by);
         if (adverbs.count == max_further_adverbs(r)) { // no room for `grant`
             return std::nullopt;
         }
@@ -78,7 +78,7 @@ std::optional<movable_request> work_sharing::movable(const protocol::request_lin
     std::string scratch;
     return movable_request{{.path = protocol::canonical_path(r.noun, scratch),
                             .via = r.via,
-                            .requester = requester,
+                            .by = by,
                             .adverbs = adverbs.text,
                             .size = r.text.size()}};
 }
@@ -271,25 +271,35 @@ class work_sharing::forwarding final : public job_taker {
         const auto noun = node_ + ":" + std::string{r.path()};
         auto adverbs = std::string{r.adverbs()};
         if (adverbs.empty()) {
-            adverbs = forwarded_adverbs({}, 0, by_.node_.name, r.requester()).text;
+            adverbs = forwarded_adverbs({}, 0, by_.node_.name, r.origin()).text;
         }
         adverbs.append(" grant=").append(protocol::grant_text(grant_.number));
         const auto ticket = ++by_.last_ticket_;
-        const auto request =
-            by_.out_.send({.verb = verb::delegate,
-                           .noun = noun,
-                           .carried = job->wanted().carried(),
-                           .adverbs = adverbs,
-                           .body = body},
-                          job->due(), detail::pending_ptr{new moved_reply(by_, ticket)}, progress_to(job));
+        auto reply = detail::pending_ptr{new moved_reply(by_, ticket)};
         job->leave_to_others();
-        by_.moved_.emplace(ticket, moved_job{.job = std::move(job),
-                                             .ended = std::move(ended),
-                                             .node = node_,
-                                             .grant = grant_.number,
-                                             .request = request,
-                                             .sent = now_});
+        auto& moved = by_.moved_
+                          .emplace(ticket, moved_job{.job = std::move(job),
+                                                     .ended = std::move(ended),
+                                                     .node = node_,
+                                                     .grant = grant_.number,
+                                                     .request = 0,
+                                                     .sent = now_})
+                          .first->second;
         ++taken_;
+        protocol::failure why;
+        const auto permit = forwarding_permit::ask(by_.node_, r.origin(), node_, verb::delegate, r.path(), r.via(),
+                                                   std::move(adverbs), why);
+        if (!permit) { // although it was chosen: it returns to the queue
+            by_.node_.completions.put(completion{completion::failure{std::move(reply), why.code, why.message}});
+            return ticket;
+        }
+        moved.request = by_.out_.forward(*permit,
+                                         {.verb = verb::delegate,
+                                          .noun = noun,
+                                          .carried = moved.job->wanted().carried(),
+                                          .adverbs = permit->adverbs(),
+                                          .body = body},
+                                         moved.job->due(), std::move(reply), progress_to(moved.job));
         return ticket;
     }
 
@@ -303,7 +313,7 @@ class work_sharing::forwarding final : public job_taker {
         const auto refused = other_.refused.find(task);
         return r.size() <= other_.longest && (refused == other_.refused.end() || refused->second <= now_) &&
                offers(task) && !is_in_via(r.via(), node_) &&
-               permits(by_.node_, r.requester(), node_, verb::delegate, r.path());
+               may_pass_on(by_.node_, r.origin(), node_, verb::delegate, r.path()) == passage::permitted;
     }
     // The first one for which there is no worker waits for half a job on average.
     [[nodiscard]] bool is_worth_it(std::size_t ahead) const noexcept {
@@ -588,9 +598,9 @@ void work_sharing::push(const sent_slots& what, const std::string& body) {
             (*self)->on_reply(what, found);
         }
     };
-    out_.send({.verb = verb::push, .noun = noun, .adverbs = adverbs, .body = body},
-              node_.time.now() + slot_grants::valid_for, detail::pending_ptr{new peer_reply{std::move(then), true}},
-              {});
+    out_.send_own({.verb = verb::push, .noun = noun, .adverbs = adverbs, .body = body},
+                  node_.time.now() + slot_grants::valid_for,
+                  detail::pending_ptr{new peer_reply{std::move(then), true}});
 }
 
 void work_sharing::on_reply(const sent_slots& what, const peer_answer& found) {

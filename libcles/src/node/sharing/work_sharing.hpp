@@ -45,10 +45,13 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
         [[nodiscard]] virtual const service_registry* registry() const = 0;
         /// Whether that node is live, and reached by a stream, without a third node.
         [[nodiscard]] virtual bool is_neighbour(const known_node& other) const = 0;
-        /// Sends a request to the node that its noun names. The outcome is reported to `reply`, never inside this
-        /// call. Returns a ticket for `cancel`.
-        virtual std::uint64_t send(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
-                                   outbound::progress_function progress) = 0;
+        /// Passes on a job to the node of the permit. The outcome is reported to `reply`, never inside this call.
+        /// Returns a ticket for `cancel`.
+        virtual std::uint64_t forward(const forwarding_permit& permit, const protocol::outgoing_request& r,
+                                      time_point due, detail::pending_ptr reply,
+                                      outbound::progress_function progress) = 0;
+        /// Sends a request of this node itself to the node that its noun names.
+        virtual void send_own(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply) = 0;
         /// Cancels it; the outcome may be reported inside this call.
         virtual void cancel(std::uint64_t ticket) = 0;
         virtual std::uint32_t random() = 0;

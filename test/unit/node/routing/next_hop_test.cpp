@@ -24,10 +24,11 @@ cles::protocol::request_line parsed(std::string_view line) {
 
 std::string adverbs(const std::string& line, std::string_view requester = {}) {
     const auto r = parsed(line);
-    const auto all = cles::core::forwarded_adverbs(r, cles::core::hops_after(r), "car1", requester);
+    const auto all = cles::core::forwarded_adverbs(r, cles::core::hops_after(r), "car1", {.requester = requester});
     BOOST_TEST(static_cast<std::ptrdiff_t>(all.count) == 1 + std::count(all.text.begin(), all.text.end(), ' '));
     if (!cles::core::has_adverbs_to_forward(r)) {
-        BOOST_TEST(all.text == cles::core::forwarded_adverbs({}, cles::core::hops_after(r), "car1", requester).text);
+        BOOST_TEST(all.text ==
+                   cles::core::forwarded_adverbs({}, cles::core::hops_after(r), "car1", {.requester = requester}).text);
     }
     return all.text;
 }
@@ -73,7 +74,7 @@ BOOST_AUTO_TEST_CASE(what_is_forwarded_never_has_too_many_adverbs) {
     for (const std::string how : {"PULL", "PUSH", "DELEGATE", "BIND", "UPDATE"}) {
         const auto line = how + " car2:speed sig=s from=car8 trace=" + trace_value + unknown(13);
         const auto r = parsed(line);
-        const auto further = cles::core::forwarded_adverbs(r, cles::core::hops_after(r), "car1", "car8");
+        const auto further = cles::core::forwarded_adverbs(r, cles::core::hops_after(r), "car1", {.requester = "car8"});
         std::string text;
         cles::protocol::append_request(text, {.verb = r.verb,
                                               .noun = "car2:speed",

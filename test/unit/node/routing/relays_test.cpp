@@ -27,12 +27,16 @@ BOOST_AUTO_TEST_CASE(waiters_that_have_ended_are_not_kept) {
     const auto kept = std::make_shared<int>();
     int told = 0;
     auto waits = std::make_shared<int>();
+    cles::protocol::failure why_not;
+    const auto permit =
+        cles::core::forwarding_permit::ask(*node.host, {}, "car2", verb::bind, "pose", {}, "hops=7 via=car1", why_not);
+    BOOST_REQUIRE(permit);
     const auto tell = [kept, &told](auto*, std::string_view, const auto& /*mark*/, const auto& /*why*/) { ++told; };
     for (int i = 0; i < 100; ++i) {
-        from->join("car2", {"pose"}, "hops=7 via=car1", waits, tell);
+        from->join(*permit, {"pose"}, waits, tell);
         waits = std::make_shared<int>();
     }
-    from->join("car2", {"pose"}, "hops=7 via=car1", waits, tell);
+    from->join(*permit, {"pose"}, waits, tell);
     BOOST_TEST(kept.use_count() < 5);
     ways.bound("car2:pose").binds("{}");
     BOOST_TEST(told == 1);

@@ -18,7 +18,7 @@ using cles::core::member_of;
 
 struct fixture {
     [[nodiscard]] bool may_pull(std::string_view target) const {
-        return cles::core::permits(*node.host, "car1", target, verb::pull, "speed");
+        return cles::core::permits(*node.host, {.requester = "car1"}, target, verb::pull, "speed");
     }
 
     std::shared_ptr<cles::test::scripted_security> security = std::make_shared<cles::test::scripted_security>();
@@ -50,7 +50,7 @@ BOOST_AUTO_TEST_CASE(a_members_own_name_with_a_dot_has_precedence) {
 BOOST_AUTO_TEST_CASE(without_security_names_have_no_meaning) {
     cles::test::test_node open;
     BOOST_TEST(member_of(*open.host, "north.car3") == "north.car3");
-    BOOST_TEST(cles::core::permits(*open.host, "", "north.nobody", verb::pull, "speed"));
+    BOOST_TEST(cles::core::permits(*open.host, {}, "north.nobody", verb::pull, "speed"));
 }
 
 BOOST_AUTO_TEST_CASE(the_rights_are_those_for_the_member) {

@@ -75,8 +75,9 @@ class test_queue final : public shareable_queue {
 /// The node car1, which shares the jobs of a queue with car2; the test plays the others.
 struct sharing_fixture : routing_fixture, private core::work_sharing::client {
     sharing_fixture() { start(); }
-    sharing_fixture(std::shared_ptr<core::node_security> security, const std::string& client)
-        : routing_fixture(std::move(security), client) {
+    sharing_fixture(std::shared_ptr<core::node_security> security, const std::string& client,
+                    core::other_pools* pools = nullptr)
+        : routing_fixture(std::move(security), client, pools) {
         start();
     }
     ~sharing_fixture() {
@@ -122,9 +123,12 @@ struct sharing_fixture : routing_fixture, private core::work_sharing::client {
 
     [[nodiscard]] const core::service_registry* registry() const override { return &routing->registry(); }
     [[nodiscard]] bool is_neighbour(const core::known_node& other) const override { return !far.contains(other.name); }
-    std::uint64_t send(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
-                       core::outbound::progress_function progress) override {
-        return ways.send(r, due, std::move(reply), std::move(progress), {});
+    std::uint64_t forward(const core::forwarding_permit& permit, const protocol::outgoing_request& r, time_point due,
+                          detail::pending_ptr reply, core::outbound::progress_function progress) override {
+        return ways.forward(permit, r, due, std::move(reply), std::move(progress));
+    }
+    void send_own(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply) override {
+        ways.send_own(r, due, std::move(reply));
     }
     void cancel(std::uint64_t ticket) override { ways.cancel(ticket); }
     std::uint32_t random() override { return ++drawn_; }

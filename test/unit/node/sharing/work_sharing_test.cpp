@@ -860,7 +860,7 @@ BOOST_AUTO_TEST_CASE(a_job_moves_with_the_name_of_its_requester) {
     BOOST_TEST(granted(1) == "id=900 {\"taken\":1,\"waiting\":0}\n");
     BOOST_TEST(sent().text == "DELEGATE car2:work/1 hops=0 via=car1 from=sat1 grant=00000000000000aa {}");
     submit("DELEGATE car1:work/2 id=2 sig=s");
-    grant(1);
+    granted(1);
     BOOST_TEST(sent().text == "DELEGATE car2:work/2 hops=0 via=car1 from=sat1 sig=s grant=00000000000000aa {}");
 }
 
