@@ -38,8 +38,8 @@ constexpr std::array faults{
     fault{"crashes_in_entry", "its entry point ends the process by signal 11 (SIGSEGV)"},
     fault{"describes_nothing", "its entry returns no description"},
     fault{"exits_when_loaded", "its initialization ends the process"},
-    fault{"lacks_start", "its description lacks members of version 1.4 of the plugin ABI"},
-    fault{"newer_minor", "it needs version 1.11 of the plugin ABI, this host has 1.4"},
+    fault{"lacks_start", "its description lacks members of version 1.5 of the plugin ABI"},
+    fault{"newer_minor", "it needs version 1.12 of the plugin ABI, this host has 1.5"},
     fault{"no_entry", "it is not a plugin: it has no function 'cles_plugin_v1'"},
     fault{"other_version", "it was made for version 2 of the plugin ABI, this host has version 1"},
     fault{"refuses", "the device is on fire"},
@@ -52,7 +52,7 @@ constexpr std::array faults{
     fault{"throws_when_loaded", "thrown by a global object"},
     fault{"too_short", "its description is too short"},
     fault{"undefined_symbol", "cles_test_nobody_has_this"},
-    fault{"wrong_major", "it needs version 2.4 of the plugin ABI, this host has 1.4"},
+    fault{"wrong_major", "it needs version 2.5 of the plugin ABI, this host has 1.5"},
 };
 
 struct fixture {

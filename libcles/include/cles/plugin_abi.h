@@ -34,7 +34,7 @@ extern "C" {
 #endif
 
 #define CLES_PLUGIN_ABI_MAJOR 1u
-#define CLES_PLUGIN_ABI_MINOR 4u
+#define CLES_PLUGIN_ABI_MINOR 5u
 /* The name of the entry point, as text. */
 #define CLES_PLUGIN_ENTRY "cles_plugin_v1"
 
@@ -72,9 +72,11 @@ typedef struct cles_request {
     cles_text task;
     const cles_text* parameters; /* after the task, percent-decoded */
     size_t parameter_count;
-    cles_text body;           /* valid JSON; {} if there is none */
-    int64_t left_ns;          /* time until the requester stops waiting; 0 if not known */
-    cles_text peer_transport; /* the requester: the scheme of its URL, such as "tcp"; or "multicast" */
+    cles_text body;  /* valid JSON; {} if there is none */
+    int64_t left_ns; /* time until the requester stops waiting; 0 if not known */
+    /* The other end of the link on which the request has arrived. If another node has forwarded it, that is this node,
+     * not the requester. */
+    cles_text peer_transport; /* the scheme of its URL, such as "tcp"; or "multicast" */
     cles_text peer_address;   /* as a URL */
     cles_text peer_name;      /* the node's authenticated name; empty if there is none */
     int64_t peer_uid;         /* of the process, if the kernel reports it; otherwise -1 */
@@ -83,6 +85,11 @@ typedef struct cles_request {
     /* Since 1.4: the trace that the request belongs to, as a W3C traceparent; empty if there is none. Requests that the
      * job sends with `delegate` belong to it, too. */
     cles_text trace;
+    /* Since 1.5; a plugin that also supports older hosts checks `size`. In a secured fleet, the member whose request it
+     * is; empty without security. */
+    cles_text requester;
+    /* The member that has forwarded it for the requester; empty if the requester itself is the peer. */
+    cles_text forwarded_by;
 } cles_request;
 
 /* The task may run twice without harm, so that another node can replace one that was lost meanwhile. */

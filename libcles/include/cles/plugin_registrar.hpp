@@ -77,7 +77,9 @@ class plugin_task {
                                 .deadline = asked.left_ns == 0
                                                 ? time_point{}
                                                 : time_point::clock::now() + std::chrono::nanoseconds{asked.left_ns},
-                                .trace = view_of(asked.trace)};
+                                .trace = view_of(asked.trace),
+                                .requester = view_of(asked.requester),
+                                .forwarded_by = view_of(asked.forwarded_by)};
         const request what{data};
         if (task.plain) {
             std::string result;

@@ -65,6 +65,12 @@ std::string request_line(std::uint64_t id, const request& what) {
     if (!what.trace().empty()) {
         line.adverb("trace", what.trace());
     }
+    if (!what.requester().empty()) {
+        line.adverb("requester", what.requester());
+    }
+    if (!what.forwarded_by().empty()) {
+        line.adverb("forwarder", what.forwarded_by());
+    }
     return line.body(what.body());
 }
 

@@ -203,6 +203,8 @@ std::string process_jobs::serve(const wire_line& line, std::string_view node) {
         .peer = &peer,
         .deadline = due ? time_point{time_point::duration{*due}} : time_point{},
         .trace = trace,
+        .requester = line.adverb("requester"),
+        .forwarded_by = line.adverb("forwarder"),
     };
     handled->begin();
     try {

@@ -320,7 +320,9 @@ void loaded_plugin::call_handler(task_handler handler, void* user, const request
                              .peer_uid = peer.uid ? static_cast<std::int64_t>(*peer.uid) : -1,
                              .peer_local = peer.local ? 1 : 0,
                              .reserved = 0,
-                             .trace = abi_text(what.trace())};
+                             .trace = abi_text(what.trace()),
+                             .requester = abi_text(what.requester()),
+                             .forwarded_by = abi_text(what.forwarded_by())};
     const auto report_exception = [&](const std::string& how) {
         log(log_level::error, std::string{what.task()} + ": its handler threw " + how + " out of the plugin");
         jobs_.finish(job, [](const responder& to) { to.fail(errc::failed, "the handler failed"); });

@@ -94,8 +94,8 @@ class Check(unittest.TestCase):
     def test_unusable_plugins(self):
         for name, words in (("crashes_in_entry", "its entry point ends the process by signal 11"),
                             ("exits_when_loaded", "ends the process"),
-                            ("wrong_major", "this host has 1.4"),
-                            ("newer_minor", "this host has 1.4"),
+                            ("wrong_major", "this host has 1.5"),
+                            ("newer_minor", "this host has 1.5"),
                             ("no_entry", "it is not a plugin"),
                             ("undefined_symbol", "cannot be loaded"),
                             ("crashes_in_check", "its settings check ends the process by signal 6")):

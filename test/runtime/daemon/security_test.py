@@ -130,17 +130,50 @@ class LocalUsers(unittest.TestCase):
                 self.assertNotIn('"node"', self.ask_as(daemon, car1, "PULL self:cles"))
 
 
+def with_plugin(fleet, isolation):
+    """The lines of a configuration for the plugin that says who asks."""
+    os.mkdir(fleet.file("plugins"), 0o755)
+    shutil.copy(HOSTILE, fleet.file("plugins"))
+    return f"plugin_path: {fleet.file('plugins')}\nplugins:\n  - path: hostile.so\n    isolation: {isolation}\n"
+
+
+class Forwarding(unittest.TestCase):
+    def test_a_node_without_the_right_forwards_by_no_target(self):
+        with Fleet("car1", "hub", "sat1") as fleet:
+            fleet.rule("car1", "deny sat1 may pull *:caller\n")
+            with Node(fleet, "car1", with_plugin(fleet, "none")), Node(fleet, "hub") as hub:
+                wait_until(lambda: hub.peers() == {"car1"}, "hub has discovered car1")
+                for target in ("car1", "any", "all"):
+                    _, out, err = cles("pull", f"{target}:caller", "-k", fleet.keys("sat1"), "--at", hub.url)
+                    self.assertNotIn("transport", out, target)
+                    self.assertIn("hub may not forward requests of sat1 to ", out + err)
+
+    def test_plugins_know_the_requester_and_the_forwarder(self):
+        for isolation in ("none", "process"):
+            with self.subTest(isolation), Fleet("car1", "hub", "sat1") as fleet:
+                fleet.let_forward("hub")
+                fleet.spread("car1", "hub")
+                with Node(fleet, "car1", with_plugin(fleet, isolation)) as car1, Node(fleet, "hub") as hub:
+                    wait_until(lambda: hub.peers() == {"car1"}, "hub has discovered car1")
+                    for target in ("car1", "any"):
+                        code, out, err = cles("pull", f"{target}:caller", "-k", fleet.keys("sat1"), "--at", hub.url,
+                                              "-o", "json")
+                        self.assertEqual(code, 0, err)
+                        caller = json.loads(out)
+                        self.assertEqual((caller["name"], caller["requester"], caller["forwarded_by"]),
+                                         ("hub", "sat1", "hub"))
+                    own = json.loads(car1.ask("PULL self:caller"))
+                    self.assertEqual((own["transport"], own["requester"], own["forwarded_by"]), ("unix", "car1", ""))
+
+
 class Isolation(unittest.TestCase):
     def test_an_isolated_plugin_sees_the_requester_and_not_the_key(self):
         with Fleet("car1", "car2") as fleet:
-            os.mkdir(fleet.file("plugins"), 0o755)
-            shutil.copy(HOSTILE, fleet.file("plugins"))
-            more = f"plugin_path: {fleet.file('plugins')}\nplugins:\n  - path: hostile.so\n    isolation: process\n"
-            with Node(fleet, "car1", more) as node:
+            with Node(fleet, "car1", with_plugin(fleet, "process")) as node:
                 code, out, err = cles("pull", "car1:caller", "-k", fleet.keys("car2"), "--at", node.url, "-o", "json")
                 self.assertEqual(code, 0, err)
                 caller = json.loads(out)
-                self.assertEqual((caller["transport"], caller["name"]), ("tls", "car2"))
+                self.assertEqual((caller["transport"], caller["name"], caller["requester"]), ("tls", "car2", "car2"))
                 confined = next(each for each in node.messages() if "confined to" in each)
                 if "no Landlock" not in confined:
                     key = os.path.join(fleet.keys("car1"), "key").replace("/", "%2F")

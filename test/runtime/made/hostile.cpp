@@ -52,14 +52,16 @@ struct settings {
 BOOST_DESCRIBE_STRUCT(settings, (), (crash_at_start, crash_while, slow_while, talk_at_stop, padding))
 
 struct caller {
-    std::string node, transport, name;
+    std::string node, transport, name, requester, forwarded_by;
     bool has_address = false, local = false;
     std::vector<std::string> parameters;
     std::string body;
     bool has_deadline = false;
     std::string trace;
 };
-BOOST_DESCRIBE_STRUCT(caller, (), (node, transport, name, has_address, local, parameters, body, has_deadline, trace))
+BOOST_DESCRIBE_STRUCT(caller, (),
+                      (node, transport, name, requester, forwarded_by, has_address, local, parameters, body,
+                       has_deadline, trace))
 
 struct point {
     double x = 0, y = 0;
@@ -71,6 +73,8 @@ caller describe(const cles::request& asked) {
     return {.node = std::string{asked.node()},
             .transport = asked.peer().transport,
             .name = asked.peer().name,
+            .requester = std::string{asked.requester()},
+            .forwarded_by = std::string{asked.forwarded_by()},
             .has_address = asked.peer().address.starts_with("tcp://127.0.0.1:"),
             .local = asked.peer().local,
             .parameters = {asked.parameters().begin(), asked.parameters().end()},
