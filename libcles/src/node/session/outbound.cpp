@@ -72,6 +72,9 @@ void outbound::on_due(entry& e, time_point now) {
         out_.check_peer(e.copies->sent());
         resend(e, now);
     } else {
+        if (e.verb == verb::delegate) { // the peer's deadline began later, and its job would run on
+            cancel_at_peer(e.id);
+        }
         fail(e.id, errc::deadline, "no answer was received in time");
     }
 }
@@ -135,6 +138,12 @@ bool outbound::cancel(std::uint64_t id) {
     if (!waiting_.contains(id)) {
         return false;
     }
+    cancel_at_peer(id);
+    fail(id, errc::cancelled, "the request was cancelled");
+    return true;
+}
+
+void outbound::cancel_at_peer(std::uint64_t id) {
     const auto noun = "self:cles/cancel/" + std::to_string(id + first_id_);
     if (out_.is_datagram()) { // it may be lost
         const auto now = node_.time.now();
@@ -145,8 +154,6 @@ bool outbound::cancel(std::uint64_t id) {
         protocol::append_request(out_.output(), {.verb = verb::push, .noun = noun, .wants_reply = false});
         out_.wake();
     }
-    fail(id, errc::cancelled, "the request was cancelled");
-    return true;
 }
 
 void outbound::drop(std::uint64_t id) {

@@ -89,6 +89,7 @@ class outbound {
     [[nodiscard]] std::size_t longest() const noexcept;
     [[nodiscard]] bool has_memory_for(const protocol::outgoing_request& request);
     [[gnu::cold]] void on_due(entry& e, time_point now);
+    [[gnu::cold]] void cancel_at_peer(std::uint64_t id);
     [[gnu::cold]] void resend(entry& e, time_point now);
     void rearm(std::unique_ptr<entry> e, time_point due);
     std::unique_ptr<entry> take(std::uint64_t id);

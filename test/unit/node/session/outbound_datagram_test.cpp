@@ -74,6 +74,17 @@ BOOST_AUTO_TEST_CASE(copies_end_at_the_deadline_which_counts_from_the_first) {
     BOOST_TEST(during(10s).empty());
 }
 
+BOOST_AUTO_TEST_CASE(a_job_whose_deadline_passes_is_cancelled_at_the_peer) {
+    send(901, verb::delegate, 100ms);
+    send(902, verb::pull, 100ms);
+    link.take();
+    const auto sent = during(100ms);
+    BOOST_REQUIRE(sent.size() == 1U);
+    BOOST_TEST(sent[0].starts_with("PUSH self:cles/cancel/5000000901 id="), sent[0]);
+    BOOST_TEST(during(10s).size() > 0U); // until it is answered, or its own deadline
+    BOOST_TEST(node.host->deadlines.size() == 0U);
+}
+
 BOOST_AUTO_TEST_CASE(a_repeated_reply_is_dropped) {
     const auto result = send(1);
     link.ask("id=5000000001 [1]");

@@ -108,6 +108,28 @@ BOOST_AUTO_TEST_CASE(a_request_without_an_answer_ends_at_its_deadline) {
     BOOST_TEST(dropped() == 1U);
 }
 
+// The peer counts from when it has read the request: its job would go on for as long as the request was on its way.
+BOOST_AUTO_TEST_CASE(a_job_whose_deadline_passes_is_cancelled_at_the_peer) {
+    send(7, verb::delegate, 200ms);
+    link.take();
+    node.pass(200ms);
+    BOOST_TEST(link.take() == "PUSH self:cles/cancel/7 reply=no\n");
+    send(8, verb::delegate, 200ms);
+    link.take();
+    link.ask("id=8 {}");
+    node.pass(200ms);
+    BOOST_TEST(link.take() == "");
+}
+
+BOOST_AUTO_TEST_CASE(other_requests_are_not_cancelled_at_their_deadline) {
+    for (const auto v : {verb::pull, verb::push, verb::bind}) {
+        send(7, v, 200ms);
+        link.take();
+        node.pass(200ms);
+        BOOST_TEST(link.take() == "");
+    }
+}
+
 BOOST_AUTO_TEST_CASE(a_failure_has_its_code_and_the_peers_message) {
     const auto result = send(7);
     link.ask("id=7 {\"error\":\"no_task\",\"message\":\"car2 has no PULL 'speed'\"}");
