@@ -29,7 +29,6 @@ void feed_machine::on_bound(std::string_view last, const std::optional<update_ma
     }
     state_ = state::bound;
     deadlines_.disarm(*this);
-    backoff_.reset();
     // The events are queued before the caller's operation completes, so that it finds them in order.
     const std::string body{last};
     if (was_bound_) {
@@ -132,6 +131,9 @@ void feed_machine::on_lost(std::string_view why, time_point now) {
     if (state_ != state::bound) {
         return;
     }
+    if (now - bind_sent_at_ >= proven) {
+        backoff_.reset();
+    }
     pause(now);
     mail_.put({.kind = feed_event::lost, .text = why});
 }
@@ -153,6 +155,7 @@ void feed_machine::on_deadline(time_point now) {
         on_refused(errc::deadline, "no answer was received in time", now);
     } else if (state_ == state::pausing) {
         state_ = state::binding;
+        bind_sent_at_ = now;
         host_.bind(*this);
     } else if (state_ == state::bound) {
         host_.renew(*this, lease_end_);

@@ -124,6 +124,10 @@ class feed_machine final
     [[nodiscard]] bool is_starting() const noexcept { return first_ != nullptr; }
 
   private:
+    /// For how long a binding lives until pauses begin anew: a publisher that replies and closes the link each time is
+    /// not asked ten times a second.
+    static constexpr std::chrono::seconds proven{5};
+
     enum class state : std::uint8_t { fresh, binding, bound, pausing, closed };
 
     bool on_event(const detail::raw_event& event, feed_mailbox::hand_over when) override {
@@ -145,7 +149,8 @@ class feed_machine final
     jitter jitter_;                   // of renewals
     std::chrono::milliseconds lease_; // limits::lease
     time_point lease_end_{};
-    time_point bound_at_{}; // when the BIND was sent from which leases count
+    time_point bind_sent_at_{}; // after a pause; the first binding counts as proven
+    time_point bound_at_{};     // when the BIND was sent from which leases count
     state state_ = state::fresh;
     bool was_bound_ = false;
     detail::pending_ptr first_;

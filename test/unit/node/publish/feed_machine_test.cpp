@@ -265,10 +265,25 @@ BOOST_AUTO_TEST_CASE(pauses_grow_while_the_publisher_is_unreachable_and_then_res
     BOOST_TEST(next() == "(nothing)"); // failed attempts are not events
     pass(5s);
     feed.on_bound("{}");
+    pass(5s);
     lose();
     const auto before = host.binds;
     pass(100ms);
     BOOST_TEST(host.binds == before + 1);
+}
+
+BOOST_AUTO_TEST_CASE(pauses_grow_while_bindings_live_for_a_short_time) {
+    bound();
+    lose();
+    for (auto passed = 0ms; passed < 60s; passed += 10ms) {
+        const auto before = host.binds;
+        pass(10ms);
+        if (host.binds != before) {
+            feed.on_bound("{}");
+            lose();
+        }
+    }
+    BOOST_TEST(host.binds < 25); // 7 in the first 5 s, and then one every 4 to 5 s
 }
 
 BOOST_AUTO_TEST_CASE(the_gap_of_an_outage_is_reported) {
