@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "pool.hpp"
 
+#include <cles/printable.hpp>
+
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -79,8 +81,10 @@ std::map<std::string, sgd::recipe> pool::find() {
     }
     std::string silent;
     for (const auto& [name, why] : found.errors) {
-        std::fprintf(stderr, "cles-dsgd: %s does not take part: %s\n", name.c_str(), why.message.c_str());
-        silent += (silent.empty() ? "" : ", ") + name;
+        const auto shown = cles::printable(name);
+        std::fprintf(stderr, "cles-dsgd: %s does not take part: %s\n", shown.c_str(),
+                     cles::printable(why.message).c_str());
+        silent += (silent.empty() ? "" : ", ") + shown;
     }
     if (found.results.empty()) {
         throw cles::error(cles::errc::deadline, "no node that offers 'sgd' answers: " + silent);

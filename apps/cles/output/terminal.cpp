@@ -28,8 +28,8 @@ std::string styled(stream s, std::string_view style, std::string_view text) {
     return std::string{"\x1b["}.append(style).append("m").append(text).append("\x1b[0m");
 }
 
-// What the caller may have forgotten to make printable. Its own text contains none of it, except C0 for lines and
-// colours.
+// C1 and characters that change the direction of writing, which the caller may have forgotten to make printable. C0
+// stays: its own text contains lines and colours.
 std::string without_foreign_controls(std::string_view text) {
     std::string out;
     while (!text.empty()) {
