@@ -209,7 +209,8 @@ std::optional<protocol::failure> task_execution::signature_refusal() {
                                  .message = node_->name + ": '" + std::string{line_.noun.task} +
                                             "' requires signed requests, and this node has no security"};
     }
-    auto why = node_->secured->refusal(*data_.peer, line_, due_, now_);
+    // Not the time of the lines that were read together: an earlier one of them may have taken long.
+    auto why = node_->secured->refusal(*data_.peer, line_, due_, node_->time.now());
     data_.deadline = due_;
     return why;
 }
