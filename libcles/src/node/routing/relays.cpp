@@ -177,6 +177,13 @@ void relayed_bindings::bind(const forwarding_permit& permit, const relayed_path&
                 waits->fail(why);
                 return;
             }
+            // The right may have ended while the node was found, reached or asked.
+            const auto& by = noun.path.by;
+            const auto may = may_pass_on(from_->host(), by, noun.node, verb::bind, noun.path.text);
+            if (may != passage::permitted) {
+                waits->fail(no_passage(from_->host(), may, by.requester, noun.node, verb::bind, noun.path.text));
+                return;
+            }
             if (!waits->can_answer(last.size())) {
                 waits->fail({.code = errc::busy, .message = "no memory is left for the answer (limits.memory)"});
                 return;

@@ -181,6 +181,15 @@ BOOST_AUTO_TEST_CASE(a_right_that_ends_while_a_request_waits_counts) {
             BOOST_TEST(reply.find("car1 may not forward requests of sat1") != std::string::npos, reply);
         }
     }
+    {
+        fixture f;
+        BOOST_TEST(f.link.ask("BIND car2:there id=7").empty());
+        f.security->forwarders = {};
+        f.ways.bound("car2:there").binds("{}");
+        const auto reply = f.link.take();
+        BOOST_TEST(reply.find("car1 may not forward requests of sat1") != std::string::npos, reply);
+        BOOST_TEST(f.ways.count_bound() == 0U);
+    }
     fixture f;
     f.submit("DELEGATE car1:work id=7");
     f.security->forwarders = {};
