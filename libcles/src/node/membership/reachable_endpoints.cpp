@@ -160,4 +160,12 @@ std::string host_of(const identity& peer) {
     return where ? where->host : peer.address;
 }
 
+std::string holder_of(const identity& peer) {
+    if (peer.uid) {
+        return "user " + std::to_string(*peer.uid);
+    }
+    const auto host = host_of(peer);
+    return host.empty() ? peer.transport : share_of_address(host);
+}
+
 } // namespace cles::core

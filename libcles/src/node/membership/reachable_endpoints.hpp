@@ -27,6 +27,8 @@ struct observed_source {
 /// The host of a peer's address. If that is not a URL, its whole text, which is empty if the peer disconnected before
 /// the system could report its address.
 std::string host_of(const identity& peer);
+/// Whose share of what the node has for others is used up by a link: a network of addresses, or a local user.
+std::string holder_of(const identity& peer);
 
 /// The announced endpoints that are usable from here, the preferred one first.
 ///

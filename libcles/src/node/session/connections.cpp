@@ -13,15 +13,6 @@
 namespace cles::core {
 namespace {
 
-// The holder whose share a link counts against: a host, or a local user.
-std::string address_of(const identity& peer) {
-    if (peer.uid) {
-        return "user " + std::to_string(*peer.uid);
-    }
-    const auto host = host_of(peer);
-    return host.empty() ? peer.transport : share_of_address(host);
-}
-
 // How many links may close gracefully at a time: each holds a descriptor for up to `limits::discard`.
 std::size_t max_closing_links(const limits& bounds) { return std::max<std::size_t>(64, bounds.links / 4); }
 
@@ -85,7 +76,7 @@ void connections::on_accepted(link_ptr arrived, bool counted) {
 bool connections::has_capacity(const link& arrived) {
     const auto most = host_.bounds().links;
     if (arrived.datagram() == 0) {
-        return admission_.ensure_capacity(address_of(arrived.peer()), host_.now());
+        return admission_.ensure_capacity(holder_of(arrived.peer()), host_.now());
     }
     if (sources_ >= most) {
         drop_idle_sources();
@@ -116,7 +107,7 @@ void connections::reject(link_ptr arrived) {
 
 std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin from) {
     const bool counted = from == connection::origin::accepted;
-    const auto address = counted ? address_of(made->peer()) : std::string{};
+    const auto address = counted ? holder_of(made->peer()) : std::string{};
     auto c = std::make_shared<connection>(host_.shared_from_this(), std::move(made), from, ++last_number_);
     open_.emplace(c->number(), c);
     if (counted) {

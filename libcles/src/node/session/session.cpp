@@ -133,7 +133,7 @@ void session::drop_reply(std::string_view why) {
     if (!node_->log) {
         return;
     }
-    node_->log_drop(host_of(peer_), "a reply", why.empty() ? "nobody waits for it" : why, !why.empty());
+    node_->log_drop(holder_of(peer_), "a reply", why.empty() ? "nobody waits for it" : why, !why.empty());
 }
 
 void session::on_update(const subscriptions::match& found) {
@@ -155,12 +155,12 @@ void session::drop_update(const subscriptions::match& found) {
         return;
     }
     if (found.whose == nullptr) {
-        node_->log_drop(host_of(peer_), "an update", "nobody here has bound it", false);
+        node_->log_drop(holder_of(peer_), "an update", "nobody here has bound it", false);
     } else if (protocol::begins_with_error(body)) {
-        node_->log_drop(host_of(peer_), "an update", "its first key is 'error'", true);
+        node_->log_drop(holder_of(peer_), "an update", "its first key is 'error'", true);
     } else {
         const auto why = why_unreadable(body);
-        node_->log_drop(host_of(peer_), "an update", why.empty() ? "it is old, or repeated" : why, !why.empty());
+        node_->log_drop(holder_of(peer_), "an update", why.empty() ? "it is old, or repeated" : why, !why.empty());
     }
 }
 
