@@ -77,7 +77,8 @@ class source {
     }
     std::size_t below(std::size_t most) { return bits<std::uint8_t>() % most; }
     std::string_view text() {
-        const auto size = std::min<std::size_t>(bits<std::uint8_t>(), left_.size());
+        const std::size_t wanted = bits<std::uint8_t>(); // before what is left is asked for
+        const auto size = std::min(wanted, left_.size());
         const auto made = left_.substr(0, size);
         left_.remove_prefix(size);
         return made;
