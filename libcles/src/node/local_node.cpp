@@ -292,8 +292,8 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     if (!protocol::is_reserved_target(noun.target) &&
         !permits(*node_, {.requester = node_->name}, noun.target, how, noun)) {
         return fail_later(std::move(operation), errc::denied,
-                          node_->name + " may not send " + std::string{to_string(how)} + " '" + std::string{noun.task} +
-                              "' to " + std::string{noun.target});
+                          node_->name + " may not send " + request_text(how, noun.path) + " to " +
+                              std::string{noun.target});
     }
     auto* r = peer_channels_.to({.target = noun.target, .at = options.at_, .urgent = options.urgent_}, code, why);
     if (r == nullptr) {

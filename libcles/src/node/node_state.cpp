@@ -8,6 +8,13 @@
 #include <utility>
 
 namespace cles::core {
+namespace {
+
+std::string left_out_text(std::uint64_t lines) {
+    return lines == 0 ? std::string{} : " (and " + std::to_string(lines) + " since the last such line)";
+}
+
+} // namespace
 
 node_state::node_state(node_options setup, const core::clock& source, const std::function<void()>& wake)
     : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
@@ -72,11 +79,19 @@ void node_state::log_drop(std::string_view host, std::string_view what, std::str
     if (!left_out) {
         return;
     }
-    auto text = "dropped " + std::string{what} + " of " + std::string{host} + ": " + std::string{why};
-    if (*left_out != 0) {
-        text.append(" (and " + std::to_string(*left_out) + " since the last such line)");
+    post_log(malformed ? log_level::warning : log_level::debug,
+             "dropped " + std::string{what} + " of " + std::string{host} + ": " + std::string{why} +
+                 left_out_text(*left_out),
+             std::string{host});
+}
+
+void node_state::log_denial(std::string_view source, std::string what, std::string peer) {
+    if (!log) {
+        return;
     }
-    post_log(malformed ? log_level::warning : log_level::debug, std::move(text), std::string{host});
+    if (const auto left_out = denials.take(source, time.now())) {
+        post_log(log_level::info, std::move(what) + left_out_text(*left_out), std::move(peer));
+    }
 }
 
 } // namespace cles::core

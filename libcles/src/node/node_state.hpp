@@ -114,9 +114,13 @@ struct node_state {
     /// Logs that something of this host was dropped, once a minute for each host. `malformed`: no node should send it;
     /// anything else is told at `debug`. The text must not be of the peer.
     [[gnu::cold]] void log_drop(std::string_view host, std::string_view what, std::string_view why, bool malformed);
+    /// Logs that a request was denied, at `info`, a few times a minute for each source: the name of the peer, or its
+    /// host.
+    [[gnu::cold]] void log_denial(std::string_view source, std::string what, std::string peer);
 
     log_budget malformed_drops;
     log_budget other_drops;
+    log_budget denials{8};
 };
 
 } // namespace cles::core

@@ -21,10 +21,15 @@ std::optional<std::uint64_t> log_budget::take(std::string_view source, time_poin
         return 0;
     }
     if (found->next > now) {
+        if (found->taken < lines_) {
+            ++found->taken;
+            return 0;
+        }
         ++found->left_out;
         return std::nullopt;
     }
     found->next = now + between;
+    found->taken = 1;
     return std::exchange(found->left_out, 0);
 }
 

@@ -85,6 +85,7 @@ bool group_session::on_bind(const group_datagram& datagram, const protocol::requ
     // `allows` leaves the target `all` to the nodes that are asked.
     const auto peer = identity_of(datagram);
     if (!permits(*node_, origin_of(*node_, peer, bind), node_->name, verb::bind, noun) || !allows(*node_, peer, bind)) {
+        log_denial(*node_, peer, bind, "by multicast, where nothing is answered");
         return false;
     }
     if (!solicits) {

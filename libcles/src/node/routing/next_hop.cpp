@@ -230,7 +230,7 @@ std::optional<forwarding_permit> forwarding_permit::ask(const node_state& n, con
                                                         protocol::failure& why) {
     const auto found = may_pass_on(n, by, node, r.verb, r.noun);
     if (found != passage::permitted) {
-        why = no_passage(n, found, by.requester, node, r.verb, r.noun.task);
+        why = no_passage(n, found, by.requester, node, r.verb, r.noun.path);
         return std::nullopt;
     }
     return forwarding_permit{node, r.via, stated_requester(by, n.name),
@@ -243,7 +243,7 @@ std::optional<forwarding_permit> forwarding_permit::ask(const node_state& n, con
                                                         protocol::failure& why) {
     const auto found = may_pass_on(n, by, node, how, path);
     if (found != passage::permitted) {
-        why = no_passage(n, found, by.requester, node, how, path.substr(0, path.find('/')));
+        why = no_passage(n, found, by.requester, node, how, path);
         return std::nullopt;
     }
     return forwarding_permit{node, via, stated_requester(by, n.name), std::move(adverbs)};

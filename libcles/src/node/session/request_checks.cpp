@@ -4,6 +4,7 @@
 #include <cles/json_reader.hpp>
 #include <cles/pending.hpp>
 
+#include "node/membership/reachable_endpoints.hpp"
 #include "port/node_security.hpp"
 #include "protocol/grammar.hpp"
 
@@ -12,6 +13,10 @@
 #include <utility>
 
 namespace cles::core {
+
+std::string request_text(verb how, std::string_view path) {
+    return std::string{to_string(how)} + " " + protocol::quoted(path);
+}
 
 bool is_in_via(std::string_view via, std::string_view name) {
     return protocol::any_in_via(via, [name](std::string_view node) { return node == name; });
@@ -24,8 +29,8 @@ std::string_view member_at(const node_state& n, const identity& peer) {
     return peer.transport == "inproc" ? std::string_view{n.name} : peer.name;
 }
 
-std::string not_allowed(const node_state& n, verb how, std::string_view task) {
-    return n.name + " does not allow " + std::string{to_string(how)} + " '" + std::string{task} + "'";
+std::string not_allowed(const node_state& n, verb how, std::string_view path) {
+    return n.name + " does not allow " + request_text(how, path);
 }
 
 } // namespace
@@ -94,12 +99,12 @@ std::string how_to_permit_forwarding(std::string_view forwarder, std::string_vie
 }
 
 protocol::failure no_passage(const node_state& n, passage why, std::string_view requester, std::string_view node,
-                             verb how, std::string_view task) {
+                             verb how, std::string_view path) {
     return {.code = errc::denied,
             .message = why == passage::not_forwarded
                            ? n.name + " may not forward requests of " + std::string{requester} + " to " +
                                  std::string{node} + " " + how_to_permit_forwarding(n.name, requester)
-                           : not_allowed(n, how, task)};
+                           : not_allowed(n, how, path)};
 }
 
 namespace {
@@ -144,13 +149,21 @@ protocol::failure denial(const node_state& n, const identity& peer, const protoc
         if (n.security->is_member(by.requester) && !protocol::is_reserved_target(r.noun.target) &&
             !is_local_target(n, r)) {
             return no_passage(n, may_pass_on(n, by, r.noun.target, r.verb, r.noun), by.requester, r.noun.target, r.verb,
-                              r.noun.task);
+                              r.noun.path);
         }
     }
-    return {.code = errc::denied, .message = not_allowed(n, r.verb, r.noun.task)};
+    return {.code = errc::denied, .message = not_allowed(n, r.verb, r.noun.path)};
 }
 
 } // namespace
+
+void log_denial(node_state& n, const identity& peer, const protocol::request_line& r, std::string_view why) {
+    auto what = "denied " + request_text(r.verb, r.noun.path);
+    const auto source = peer.name.empty() ? holder_of(peer) : peer.name;
+    what.append(" of ").append(source);
+    what.append(r.from.empty() ? "" : ", which states from=" + protocol::quoted(r.from)).append(": ").append(why);
+    n.log_denial(source, std::move(what), peer.address);
+}
 
 bool allows(const node_state& n, const identity& peer, const protocol::request_line& r) {
     if (n.security && !is_permitted(n, peer, r)) {
@@ -181,13 +194,14 @@ bool is_local_target(const node_state& n, const protocol::request_line& r) {
     return r.noun.target == "self" || r.noun.target == n.name;
 }
 
-std::optional<protocol::failure> refusal_reason(const node_state& n, const identity& peer,
-                                                const protocol::request_line& r) {
+std::optional<protocol::failure> refusal_reason(node_state& n, const identity& peer, const protocol::request_line& r) {
     const auto object = [](errc code, std::string message) {
         return protocol::failure{.code = code, .message = std::move(message)};
     };
     if (!allows(n, peer, r)) {
-        return denial(n, peer, r);
+        auto why = denial(n, peer, r);
+        log_denial(n, peer, r, why.message);
+        return why;
     }
     // A request for the reserved task other than PULL concerns the link it arrives on, such as an id to cancel.
     const bool stays = n.active_router == nullptr || (r.noun.task == "cles" && r.verb != verb::pull);

@@ -32,6 +32,9 @@ std::optional<protocol::failure> no_capacity_to_run(const node_state& n);
 
 using protocol::failure_text;
 
+/// For messages: "PULL 'cles/metrics'". Rights are about the whole path, so its parameters belong to what is denied.
+[[gnu::cold]] std::string request_text(verb how, std::string_view path);
+
 // -- checks before a request is served -----------------------------------------------------------------------------
 
 /// Whether `name` is in the comma-separated list `via`.
@@ -71,7 +74,7 @@ passage may_pass_on(const node_state& n, const request_origin& by, std::string_v
                     std::string_view path);
 /// Why it may not leave: "car1 may not forward requests of sat1 to car2 (...)".
 [[gnu::cold]] protocol::failure no_passage(const node_state& n, passage why, std::string_view requester,
-                                           std::string_view node, verb how, std::string_view task);
+                                           std::string_view node, verb how, std::string_view path);
 
 /// Whether this node may forward for the requester; itself, and without security, for all.
 bool may_forward_for(const node_state& n, std::string_view requester);
@@ -81,11 +84,16 @@ bool may_forward_for(const node_state& n, std::string_view requester);
 /// Whether the access rules allow the request.
 bool allows(const node_state& n, const identity& peer, const protocol::request_line& request);
 
+/// Logs that a request was denied: who may not learns of it by the reply; who operates this node, by the log.
+[[gnu::cold]] void log_denial(node_state& n, const identity& peer, const protocol::request_line& request,
+                              std::string_view why);
+
 /// Whether the target is this node, by name or as `self`.
 bool is_local_target(const node_state& n, const protocol::request_line& request);
 
-/// Why a node does not serve a request, whatever its task: access, target or body. Nothing if it may.
-std::optional<protocol::failure> refusal_reason(const node_state& n, const identity& peer,
+/// Why a node does not serve a request, whatever its task: access, target or body. Nothing if it may. What is denied is
+/// logged.
+std::optional<protocol::failure> refusal_reason(node_state& n, const identity& peer,
                                                 const protocol::request_line& request);
 
 /// The reply of a node that shuts down to new requests.

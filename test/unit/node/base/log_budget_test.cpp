@@ -28,6 +28,22 @@ BOOST_AUTO_TEST_CASE(each_source_has_one_line_a_minute) {
     BOOST_TEST(!budget.take("10.0.0.1", clock.now()));
 }
 
+BOOST_AUTO_TEST_CASE(a_source_may_have_several_lines_a_minute) {
+    cles::test::manual_clock clock;
+    log_budget budget{3};
+    const auto taken = [&] {
+        int lines = 0;
+        for (int i = 0; i < 10; ++i) {
+            lines += budget.take("10.0.0.1", clock.now()) ? 1 : 0;
+        }
+        return lines;
+    };
+    BOOST_TEST(taken() == 3);
+    clock.advance(60s);
+    BOOST_TEST(budget.take("10.0.0.1", clock.now()).value() == 7U);
+    BOOST_TEST(taken() == 2);
+}
+
 BOOST_AUTO_TEST_CASE(its_sources_are_limited) {
     cles::test::manual_clock clock;
     log_budget budget;

@@ -37,6 +37,33 @@ BOOST_AUTO_TEST_CASE(a_member_may_do_what_its_rights_permit) {
     BOOST_TEST(link.kind("PUSH car1:note id=10") == "id=10 ok");
 }
 
+BOOST_AUTO_TEST_CASE(a_denial_names_all_of_the_noun_and_is_logged) {
+    std::vector<std::string> logged;
+    cles::test::test_node car1{{},
+                               {},
+                               [&](cles::log_level level, const cles::log_entry& entry) {
+                                   logged.push_back((level == cles::log_level::info ? "info: " : "other: ") +
+                                                    std::string{entry.text} + " [" + std::string{entry.peer} + "]");
+                               },
+                               {},
+                               security};
+    cles::test::test_link car2{car1, "car2"};
+    security->denied.insert("car2 PULL car1:cles/metrics");
+    BOOST_TEST(car2.reply("PULL car1:cles/metrics id=7").message == "car1 does not allow PULL 'cles/metrics'");
+    BOOST_REQUIRE_EQUAL(logged.size(), 1U);
+    BOOST_TEST(logged.front() == "info: denied PULL 'cles/metrics' of car2: car1 does not allow PULL 'cles/metrics' "
+                                 "[tcp://127.0.0.1:1]");
+
+    for (int i = 0; i < 20; ++i) { // a peer does not fill the log
+        car2.kind("PULL car1:cles/metrics id=8");
+    }
+    BOOST_TEST(logged.size() == 8U);
+    cles::test::test_link car3{car1, "car3"}; // nor silence another one
+    security->denied.insert("car3 PULL car1:cles/metrics");
+    BOOST_TEST(car3.kind("PULL car1:cles/metrics id=9") == "id=9 denied");
+    BOOST_TEST(logged.size() == 9U);
+}
+
 BOOST_AUTO_TEST_CASE(others_may_do_nothing) {
     cles::test::test_link nobody{node, ""};
     BOOST_TEST(nobody.kind("PULL car1:speed id=7") == "id=7 denied");
