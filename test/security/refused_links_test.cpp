@@ -49,6 +49,23 @@ BOOST_AUTO_TEST_CASE(each_is_logged_once_a_minute) {
     BOOST_TEST(take(kind::not_member, "10.0.0.1", "a"));
 }
 
+BOOST_AUTO_TEST_CASE(the_line_names_the_address_and_the_key) {
+    using cles::security::text_of;
+    BOOST_TEST(text_of({.source = "10.0.0.7", .why = "a", .key = "nJ3"}) == "a (10.0.0.7, key nJ3)");
+    BOOST_TEST(text_of({.source = "10.0.0.7", .why = "a"}) == "a (10.0.0.7)");
+    BOOST_TEST(text_of({.why = "a", .key = "nJ3"}) == "a (key nJ3)");
+    BOOST_TEST(text_of({.why = "a"}) == "a");
+}
+
+BOOST_AUTO_TEST_CASE(another_key_of_a_source_is_logged_too) {
+    const auto taken = [&](const std::string& key) {
+        return logged.take({.kind = kind::not_member, .source = "10.0.0.1", .why = "a", .key = key}, now);
+    };
+    BOOST_TEST(taken("one"));
+    BOOST_TEST(taken("two"));
+    BOOST_TEST(!taken("one"));
+}
+
 BOOST_AUTO_TEST_CASE(a_source_does_not_silence_another) {
     BOOST_TEST(count(kind::by_peer, 1, 1000) == cles::security::refused_links::most_of_source);
     BOOST_TEST(take(kind::by_peer, "10.0.1.1", "a"));

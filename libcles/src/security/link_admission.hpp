@@ -53,6 +53,8 @@ class link_admission {
     /// The maximum size of the next line. A longer one ends the link.
     [[nodiscard]] std::size_t max_line() const noexcept;
 
+    /// The key of the other end.
+    [[nodiscard]] const public_key& key() const noexcept { return key_; }
     /// For people.
     [[nodiscard]] const std::string& why() const noexcept { return why_; }
     [[nodiscard]] reason refused_for() const noexcept { return reason_; }

@@ -19,7 +19,11 @@ struct refused_link {
     link_admission::reason kind = link_admission::reason::none;
     std::string_view source{}; ///< the host of the other end, or another name for it
     std::string_view why{};    ///< for people
+    std::string_view key{};    ///< which the other end has proved that it has, as in NAME.pub; empty: none
 };
+
+/// "the other end's key is not in roster 3 (10.0.0.7, key nJ3...)"
+std::string text_of(const refused_link& link);
 
 /// Which refusals of links are logged. Others decide how often they try and what they say, so each is logged once a
 /// minute, and only some of a source and of a kind. What one kind or source uses up is not missing to the others.
@@ -36,6 +40,7 @@ class refused_links {
     struct logged_one {
         std::string source;
         std::string why;
+        std::string key;
         time_point at{};
     };
 

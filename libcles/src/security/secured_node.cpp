@@ -33,8 +33,7 @@ void secured_node::log(log_level level, std::string text) const {
 
 void secured_node::log_refused_link(const refused_link& link) {
     if (time_ != nullptr && refused_.take(link, time_->now())) {
-        auto text = std::string{link.why};
-        log(log_level::warning, link.source.empty() ? text : text.append(" (").append(link.source).append(")"));
+        log(log_level::warning, text_of(link));
     }
 }
 

@@ -158,7 +158,8 @@ class tls_codec final : public transport::stream_codec {
         why = code_of(admission_.refused_for());
         if (shared_->report) {
             const auto host = address_.empty() ? std::string{} : parse_url(address_).host;
-            shared_->report({.kind = admission_.refused_for(), .source = host, .why = admission_.why()});
+            const auto key = security::to_base64url(admission_.key());
+            shared_->report({.kind = admission_.refused_for(), .source = host, .why = admission_.why(), .key = key});
         }
         return status::failed;
     }
