@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "arguments.hpp"
 
+#include "options/duration.hpp"
 #include "output/errors.hpp"
 
 #include <CLI/CLI.hpp>
@@ -22,7 +23,7 @@ constexpr const char* bench_examples = "Examples:\n"
                                        "  cles bench\n"
                                        "  cles bench --transport unix\n"
                                        "  cles bench --in-flight 64 --style callback -o json\n"
-                                       "  cles bench --busy-poll 50\n"
+                                       "  cles bench --busy-poll 50us\n"
                                        "  cles bench --wake-within 0\n"
                                        "  cles bench --stress\n"
                                        "  cles bench --urgent\n"
@@ -34,7 +35,6 @@ constexpr const char* bench_examples = "Examples:\n"
 
 constexpr std::size_t max_in_flight = 4096;
 constexpr std::size_t max_binders = 1024;
-constexpr int max_wait_us = 1'000'000;
 
 const std::map<std::string, carrier> carriers{{"tcp", carrier::tcp},
                                               {"udp", carrier::udp},
@@ -172,17 +172,17 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
         ->check(CLI::IsMember({"callback", "coroutine"}).description(""))
         ->type_name("NAME");
     command
-        .add_option("--busy-poll", given.busy_poll_us,
-                    "Microseconds for which both ends of CLES poll for work before they sleep (0)")
-        ->check(CLI::Range(0, max_wait_us).description(""))
-        ->type_name("US");
+        .add_option_function<std::string>(
+            "--busy-poll", [&given](const std::string& text) { given.busy_poll = parse_wait("--busy-poll", text); },
+            "How long both ends of CLES poll for work before they sleep: 50us, 1ms, or microseconds (0)")
+        ->type_name("TIME");
     command
-        .add_option(
-            "--wake-within", given.wake_within_us,
-            "Limit the wake-up latency of this host's cores to this many microseconds, in all measurements; 0: they "
-            "do not sleep (needs /dev/cpu_dma_latency)")
-        ->check(CLI::Range(0, max_wait_us).description(""))
-        ->type_name("US");
+        .add_option_function<std::string>(
+            "--wake-within",
+            [&given](const std::string& text) { given.wake_within = parse_wait("--wake-within", text); },
+            "Limit the wake-up latency of this host's cores to this time, in all measurements: 50us, or microseconds; "
+            "0: they do not sleep (needs /dev/cpu_dma_latency)")
+        ->type_name("TIME");
     command.add_flag("--one-core", given.one_core, "Put both ends on one core");
     for (const auto& each : modes) {
         command.add_flag(each.flag, each.help);
@@ -196,9 +196,9 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
     command.add_option("--keep", given.keep, "Updates that the publisher queues for each subscriber (64)")
         ->check(CLI::Range(std::uint32_t{1}, std::uint32_t{65536}).description(""))
         ->type_name("N");
-    command.add_option("-o,--output", given.form, "table or json (table)")
-        ->check(CLI::IsMember({"table", "json"}).description(""))
-        ->type_name("FORM");
+    command.add_option("-o,--output", given.form, "table, json or raw (table)")
+        ->check(CLI::IsMember({"table", "json", "raw", "text"}).description("")) // as the other commands of `cles`
+        ->type_name("FORMAT");
 }
 
 measurement selected_measurement(const CLI::App& command, const bench_arguments& given) {

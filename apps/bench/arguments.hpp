@@ -3,6 +3,7 @@
 
 #include "options/keys_option.hpp"
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -30,8 +31,8 @@ struct bench_arguments {
     std::string against{};
     keys_option keys{};
     std::size_t in_flight = 1;
-    int busy_poll_us = 0;
-    std::optional<int> wake_within_us{};
+    std::chrono::microseconds busy_poll{0};
+    std::optional<std::chrono::microseconds> wake_within{};
     bool one_core = false;
     std::vector<std::size_t> binders{};
     std::uint32_t keep = 0;

@@ -5,6 +5,7 @@
 #include "arguments.hpp"
 #include "measurements.hpp"
 #include "output/errors.hpp"
+#include "output/help_formatter.hpp"
 #include "output/terminal.hpp"
 #include "perf/support/pinning.hpp"
 
@@ -12,6 +13,7 @@
 
 #include <csignal>
 #include <exception>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -53,6 +55,7 @@ int main(int argc, char** argv) {
     std::signal(SIGPIPE, SIG_IGN);
     tool::bench_arguments given;
     CLI::App command{"", "cles bench"};
+    command.formatter(std::make_shared<tool::help_formatter>());
     // Accepted, since `cles` accepts it after each command. A hidden option ahead of all others leaves no empty line in
     // the help text, so the help option goes behind it.
     command.set_help_flag();

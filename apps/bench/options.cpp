@@ -18,14 +18,12 @@ bench_options to_options(const bench_arguments& given, measurement what) {
                           .in_flight = given.in_flight,
                           .one_core = given.one_core,
                           .keep = given.keep,
-                          .as_json = given.form == "json"};
+                          .as_json = given.form == "json" || given.form == "raw"};
     if (!given.duration.empty()) {
         options.duration = parse_positive_duration(given.duration);
     }
-    options.how.busy_poll = std::chrono::microseconds{given.busy_poll_us};
-    if (given.wake_within_us) {
-        options.wake_within = std::chrono::microseconds{*given.wake_within_us};
-    }
+    options.how.busy_poll = given.busy_poll;
+    options.wake_within = given.wake_within;
     if (!given.binders.empty()) {
         options.binders = given.binders;
     } else if (what == measurement::fan_out) {

@@ -3,6 +3,7 @@
 
 #include "commands.hpp"
 #include "output/errors.hpp"
+#include "output/help_formatter.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -11,6 +12,7 @@
 #include <csignal>
 #include <exception>
 #include <iostream>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -76,6 +78,7 @@ int main(int argc, char** argv) {
     try {
         tool::context shared;
         CLI::App app{about, "cles"};
+        app.formatter(std::make_shared<tool::help_formatter>()); // before there are commands, which take it over
         app.footer(footer);
         app.fallthrough();
         app.require_subcommand(1);

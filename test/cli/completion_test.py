@@ -66,7 +66,7 @@ class WithoutNodes(unittest.TestCase):
         self.assertEqual(list(offered("pull", "-o", "")), ["table", "json", "raw"])
         self.assertEqual(list(offered("pull", "--output", "j")), ["json"])
         self.assertEqual(list(offered("pull", "--output=j")), ["--output=json"])
-        self.assertEqual(set(offered("ping", "-o", "")), {"json", "text"})
+        self.assertEqual(set(offered("ping", "-o", "")), {"table", "json", "raw"})
         self.assertEqual(set(offered("top", "--sort", "")), {"load", "name"})
         self.assertEqual(offered("pull", "--coun")["--count"], "Number of requests")
         self.assertEqual(offered("pull", "-n", ""), {})

@@ -11,6 +11,7 @@ import signal
 import socket
 import subprocess
 import tempfile
+import termios
 import threading
 import time
 import unittest
@@ -203,11 +204,13 @@ def id_of(line):
     return found.group(1) + " " if found else ""
 
 
-def on_terminal(*arguments, env=None, interrupt_after=None, keys=b"\x03"):
+def on_terminal(*arguments, env=None, interrupt_after=None, keys=b"\x03", columns=None):
     """Runs the command on a separate terminal; returns exit code and everything it showed. After it has shown
     `interrupt_after`, the keys are pressed."""
     pid, terminal = pty.fork()
     if pid == 0:
+        if columns is not None:
+            termios.tcsetwinsize(1, (24, columns))
         os.execve(shutil.which(CLES) or CLES, [CLES, *arguments], env or environment())
     shown = b""
     end = time.monotonic() + PATIENCE

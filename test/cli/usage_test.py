@@ -5,7 +5,7 @@
 import tempfile
 import unittest
 
-from support import HAS_SECURITY, cles, environment
+from support import HAS_SECURITY, cles, environment, finish, on_terminal, read_line, start
 
 COMMANDS = ("pull", "push", "delegate", "bind", "update", "ping", "hz", "info", "ls", "top", "doctor", "completion",
             "serve")
@@ -31,7 +31,9 @@ class Usage(unittest.TestCase):
         for noun, says in (("car1", "NODE:TASK"), (":a", "the node"), ("car1:", "the task"), ("car 1:a", "the node"),
                            ("car1:a b", "the task"), ("car1:a/", "empty"), ("car1:a//b", "empty"), ("car1:a/b c", "b c"),
                            ("car1:a/%2", "%2"), ("car1:a/%zz", "%zz"), ("car1:a/ä", "%HH"), ("x" * 65 + ":a", "64"),
-                           ("car1:a/b id=1", "id=1"), ("car1:a\nPULL self:b", "the task")):
+                           ("car1:a/b id=1", "id=1"), ("car1:a/%00", "'%00' is not text"),
+                           ("car1:a/%0A", "not text"), ("car1:a/%C2%85", "not text"), ("car1:a/%ff", "UTF-8"),
+                           ("car1:a" + "/b" * 33, "32 parameters"), ("car1:a\nPULL self:b", "the task")):
             for command in ("pull", "push", "bind", "hz"):
                 self.refused(command, noun, says=says)
 
@@ -66,7 +68,7 @@ class Usage(unittest.TestCase):
         self.refused("info", "a b", says="neither")
 
     def test_numbers(self):
-        for text in ("x", "", "-1s", "1h30", "5 s", "inf", "nan", "1e3", "0x10"):
+        for text in ("x", "", "-1s", "1h30", "5 s", "1d", "inf", "nan", "1e3", "0x10"):
             self.refused("pull", "car1:a", f"--timeout={text}", says="" if text == "" else "not a duration")
         self.refused("pull", "car1:a", "-t", "0", says="too short")
         self.refused("pull", "car1:a", "-t", "90000", says="longer than a day")
@@ -76,6 +78,32 @@ class Usage(unittest.TestCase):
         self.refused("bind", "car1:a", "--keep", "0", says="--keep")
         self.refused("bind", "car1:a", "--every", "x", says="not a duration")
         self.refused("hz", "car1:a", "-w", "0", says="--window")
+        for option in ("--busy-poll", "--wake-within"):
+            for command in ("serve", "bench"):
+                self.refused(command, option, "soon", says="write 50us")
+                self.refused(command, option, "2s", says="longer than a second")
+
+    def test_units(self):
+        for text in ("1h", "1.5h", "2min", "3s", "20ms", "20000us", "2"):
+            code, _, err = cles("pull", "self:a", "--at", "tcp://127.0.0.1:1", "-t", text, "-i", text)
+            self.assertEqual(code, 1, err)  # nobody is there
+        for text in ("50us", "1ms", "50"):
+            self.refused("serve", "--busy-poll", text, "--listen", "inproc://x", says="inproc")
+
+    def test_what_a_binding_is_for(self):
+        for command in ("bind", "hz"):
+            self.refused(command, "any:a", says="needs the name of one, or all")
+            self.assertIn("NODE may be self or all", cles("help", command)[1])
+            self.assertEqual(cles("__complete", command, "an")[1], "")
+        self.assertIn("NODE may be self, any or all", cles("help", "pull")[1])
+        self.assertIn("any:", cles("__complete", "pull", "an")[1])
+
+    def test_names_of_options(self):
+        for option in ("--name", "--node"):
+            node = start("serve", option, "car9", "--listen", "tcp://127.0.0.1:0")
+            self.assertRegex(read_line(node), "^car9 listening on ")
+            node.terminate()
+            self.assertEqual(finish(node)[0], 0)
 
     def test_top(self):
         self.refused("top", "-i", "50ms", says="too short")
@@ -88,7 +116,11 @@ class Usage(unittest.TestCase):
 
     def test_forms_of_output(self):
         self.refused("pull", "car1:a", "-o", "xml", says="xml")
-        self.refused("ping", "-o", "table", says="table")
+        for command in ("pull", "push", "delegate", "update", "bind", "ping", "hz", "info", "ls", "top", "trace", "doctor",
+                        "bench"):
+            text = " ".join(cles("help", command)[1].split())
+            self.assertRegex(text, r"-o,--output FORMAT table, json (\(one document per line\) )?or raw", command)
+            self.assertEqual(cles("__complete", command, "--output", "")[1].split(), ["table", "json", "raw"], command)
 
     def test_help(self):
         code, out, err = cles("--help")
@@ -100,6 +132,16 @@ class Usage(unittest.TestCase):
             self.assertIn("Examples:", text)
             self.assertIn(f"cles {command}", text)
         self.assertIn("Exit codes:", out)
+
+    def test_help_fits_the_terminal(self):
+        for width in (60, 80, 132):
+            for command in ((), ("pull",), ("serve",), ("doctor",), ("bench",)):
+                code, shown = on_terminal("help", *command, columns=width)
+                self.assertEqual(code, 0)
+                text = shown.replace("\r\n", "\n").split("\nExamples:")[0]
+                words = [line for line in text.split("\n") if len(line) > width and " " in line.strip()]
+                self.assertEqual(words, [], command)
+                self.assertEqual(text.split(), cles("help", *command)[1].split("\nExamples:")[0].split())
 
     def test_help_as_a_command(self):
         self.assertEqual(cles("help"), cles("--help"))

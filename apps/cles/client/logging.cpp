@@ -26,7 +26,7 @@ cles::log_sink make_log(spdlog::level::level_enum threshold) {
     const auto colours = has_colours(stream::err) ? spdlog::color_mode::always : spdlog::color_mode::never;
     auto sink = std::make_shared<spdlog::sinks::ansicolor_stderr_sink_st>(colours);
     const auto logger = std::make_shared<spdlog::logger>("cles", std::move(sink));
-    logger->set_pattern("%H:%M:%S.%e %^%-7l%$ %v");
+    logger->set_pattern("%Y-%m-%dT%H:%M:%S.%e%z %^%-7l%$ %v");
     logger->set_level(threshold);
     logger->flush_on(spdlog::level::debug);
     return [logger](cles::log_level level, std::string_view text) {

@@ -15,7 +15,7 @@
 namespace tool {
 
 void feed_arguments::add_options(CLI::App& command, const std::string& count_help) {
-    add_noun(command, noun);
+    add_noun(command, noun, "self or all");
     addresses.add_options(command, "Bind by multicast on these interfaces, which is the default for all:TASK");
     add_timeout(command, timeout, "5s");
     add_count(command, count, count_help);
@@ -33,6 +33,9 @@ bool feed_arguments::is_multicast() const {
 
 void feed_arguments::check() const {
     check_noun(noun);
+    if (target_of(noun) == "any") {
+        throw usage_error("'" + noun + "': a binding stays with its publisher, so it needs the name of one, or all");
+    }
     if (addresses.has_group() && addresses.has_at()) {
         throw usage_error("--multicast and --at cannot be combined");
     }

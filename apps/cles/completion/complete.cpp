@@ -81,7 +81,9 @@ class live_search {
         if (colon == std::string::npos) {
             auto out = names(":");
             out.push_back({"self:", "the node at the address of --at"});
-            out.push_back({"any:", "a node that offers the task"});
+            if (const auto command = cursor_.command->get_name(); command != "bind" && command != "hz") {
+                out.push_back({"any:", "a node that offers the task"});
+            }
             out.push_back({"all:", "all nodes that offer the task"});
             return out;
         }

@@ -7,6 +7,8 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
+#include <cstddef>
 #include <fstream>
 #include <iostream>
 #include <iterator>
@@ -16,6 +18,7 @@ namespace tool {
 namespace {
 
 constexpr std::size_t max_name = 64;
+constexpr std::ptrdiff_t max_parameters = 32;
 
 bool is_alphanumeric(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
 
@@ -27,18 +30,42 @@ bool is_name_character(char c) { return is_alphanumeric(c) || c == '_' || c == '
     throw usage_error("'" + std::string{noun} + "': " + reason);
 }
 
+// As nodes do: characters that are no control characters, in UTF-8.
+bool is_text(std::string_view decoded) {
+    std::string quoted = "[\"";
+    for (std::size_t i = 0; i < decoded.size(); ++i) {
+        const auto byte = static_cast<unsigned char>(decoded[i]);
+        const bool is_c1 = byte == 0xC2 && i + 1 < decoded.size() && static_cast<unsigned char>(decoded[i + 1]) < 0xA0;
+        if (byte < 0x20 || byte == 0x7F || is_c1) {
+            return false;
+        }
+        quoted.push_back(byte == '"' || byte == '\\' ? '.' : decoded[i]);
+    }
+    return cles::is_valid_json(quoted + "\"]", 1);
+}
+
 void check_parameter(std::string_view noun, std::string_view parameter) {
     if (parameter.empty()) {
         refuse_noun(noun, "a parameter is empty; a noun must not end in '/'");
     }
+    std::string decoded;
     for (std::size_t i = 0; i < parameter.size(); ++i) {
         const char c = parameter[i];
         if (c == '%' && i + 2 < parameter.size() && is_hex(parameter[i + 1]) && is_hex(parameter[i + 2])) {
+            unsigned byte = 0;
+            std::from_chars(&parameter[i + 1], &parameter[i + 1] + 2, byte, 16);
+            decoded.push_back(static_cast<char>(byte));
             i += 2;
-        } else if (!is_name_character(c) && c != '~' && c != '+') {
+        } else if (is_name_character(c) || c == '~' || c == '+') {
+            decoded.push_back(c);
+        } else {
             refuse_noun(noun, "the parameter '" + std::string{parameter} +
                                   "' may only contain letters, digits and _ - . ~ +; write others as %HH");
         }
+    }
+    if (!is_text(decoded)) {
+        refuse_noun(noun, "the parameter '" + std::string{parameter} +
+                              "' is not text: %HH may not be control characters, and have to be UTF-8 together");
     }
 }
 
@@ -76,6 +103,9 @@ void check_noun(std::string_view noun) {
     const auto slash = rest.find('/');
     if (!is_name(rest.substr(0, slash))) {
         refuse_noun(noun, "the task after ':' must be 1 to 64 letters, digits, '_', '-', '.'");
+    }
+    if (std::ranges::count(rest, '/') > max_parameters) {
+        refuse_noun(noun, "it has more than " + std::to_string(max_parameters) + " parameters");
     }
     while (rest.find('/') != std::string_view::npos) {
         rest.remove_prefix(rest.find('/') + 1);

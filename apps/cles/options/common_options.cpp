@@ -11,8 +11,8 @@
 
 namespace tool {
 
-void add_noun(CLI::App& command, std::string& noun) {
-    command.add_option("noun", noun, "NODE:TASK or NODE:TASK/PARAMETER...; NODE may be self, any or all")
+void add_noun(CLI::App& command, std::string& noun, const std::string& others) {
+    command.add_option("noun", noun, "NODE:TASK or NODE:TASK/PARAMETER...; NODE may be " + others)
         ->required()
         ->type_name("");
 }
@@ -21,7 +21,7 @@ void add_timeout(CLI::App& command, std::optional<std::chrono::milliseconds>& li
     command
         .add_option_function<std::string>(
             "-t,--timeout", [&limit](const std::string& text) { limit = parse_positive_duration(text); },
-            "How long to wait for a reply: 500ms, 2s, or seconds (default " + default_value + ")")
+            "How long to wait for a reply: 500ms, 2s, 1min, 1h, or seconds (default " + default_value + ")")
         ->type_name("TIME");
 }
 

@@ -12,8 +12,8 @@ class App;
 
 namespace tool {
 
-/// The noun, as the only argument of the command.
-void add_noun(CLI::App& command, std::string& noun);
+/// The noun, as the only argument of the command. `others`: what NODE may be besides a name.
+void add_noun(CLI::App& command, std::string& noun, const std::string& others = "self, any or all");
 
 /// -t, --timeout. `default_value` is only for the help.
 void add_timeout(CLI::App& command, std::optional<std::chrono::milliseconds>& limit, const std::string& default_value);

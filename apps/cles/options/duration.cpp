@@ -3,26 +3,59 @@
 
 #include "output/errors.hpp"
 
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 namespace tool {
 
 using namespace std::chrono_literals;
 
-std::chrono::milliseconds parse_duration(std::string_view text) {
+namespace {
+
+// Microseconds; nothing if it is not a duration.
+std::optional<double> read_microseconds(std::string_view text, std::string_view plain) {
+    static constexpr std::array<std::pair<std::string_view, double>, 5> units{
+        {{"us", 1}, {"ms", 1e3}, {"s", 1e6}, {"min", 60e6}, {"h", 3600e6}}};
     double number = 0;
     const auto* end = text.data() + text.size();
     const auto [rest, code] = std::from_chars(text.data(), end, number, std::chars_format::fixed);
-    const std::string_view unit{rest, static_cast<std::size_t>(end - rest)};
-    const double scale = unit.empty() || unit == "s" ? 1000 : unit == "ms" ? 1 : unit == "min" ? 60'000 : 0;
-    if (code != std::errc{} || scale == 0 || !std::isfinite(number) || std::signbit(number)) {
-        throw usage_error("'" + std::string{text} + "' is not a duration: write 500ms, 2s, 1min, or seconds as in 0.5");
+    const std::string_view written{rest, static_cast<std::size_t>(end - rest)};
+    const auto* const unit =
+        std::ranges::find(units, written.empty() ? plain : written, [](const auto& each) { return each.first; });
+    if (code != std::errc{} || unit == units.end() || !std::isfinite(number) || std::signbit(number)) {
+        return std::nullopt;
     }
-    if (number * scale > static_cast<double>(std::chrono::milliseconds{24h}.count())) {
+    return number * unit->second;
+}
+
+} // namespace
+
+std::chrono::milliseconds parse_duration(std::string_view text) {
+    const auto us = read_microseconds(text, "s");
+    if (!us) {
+        throw usage_error("'" + std::string{text} +
+                          "' is not a duration: write 500us, 500ms, 2s, 1min, 1h, or seconds as in 0.5");
+    }
+    if (*us > static_cast<double>(std::chrono::microseconds{24h}.count())) {
         throw usage_error("'" + std::string{text} + "' is longer than a day");
     }
-    return std::chrono::milliseconds{std::llround(number * scale)};
+    return std::chrono::milliseconds{std::llround(*us / 1e3)};
+}
+
+std::chrono::microseconds parse_wait(std::string_view option, std::string_view text) {
+    const auto us = read_microseconds(text, "us");
+    const auto given = std::string{option} + " '" + std::string{text} + "'";
+    if (!us) {
+        throw usage_error(given + " is not a duration: write 50us, 1ms, or microseconds as in 50");
+    }
+    if (*us > static_cast<double>(std::chrono::microseconds{1s}.count())) {
+        throw usage_error(given + " is longer than a second");
+    }
+    return std::chrono::microseconds{std::llround(*us)};
 }
 
 std::chrono::milliseconds parse_positive_duration(std::string_view text) {

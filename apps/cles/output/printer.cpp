@@ -9,30 +9,40 @@
 #include <CLI/Option.hpp>
 #include <CLI/Validators.hpp>
 
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
 
 namespace tool {
 
-void add_output_option(CLI::App& command, output_format& format) {
-    const std::map<std::string, output_format> names{
-        {"table", output_format::table}, {"json", output_format::json}, {"raw", output_format::raw}};
+namespace {
+
+// All commands accept the same formats. `text` is an earlier name of `table`.
+void add_format(CLI::App& command, std::function<void(output_format)> choose, const std::string& help) {
+    static const std::map<std::string, output_format> names{{"table", output_format::table},
+                                                            {"text", output_format::table},
+                                                            {"json", output_format::json},
+                                                            {"raw", output_format::raw}};
     command
         .add_option_function<std::string>(
-            "-o,--output", [&format, names](const std::string& name) { format = names.at(name); },
-            "table, json (one document per line) or raw (as received); default: table on a terminal, otherwise json")
+            "-o,--output", [choose = std::move(choose)](const std::string& name) { choose(names.at(name)); }, help)
         ->type_name("FORMAT")
-        ->check(CLI::IsMember({"table", "json", "raw"}).description(""));
+        ->check(CLI::IsMember({"table", "json", "raw", "text"}).description(""));
+}
+
+} // namespace
+
+void add_output_option(CLI::App& command, output_format& format) {
+    add_format(
+        command, [&format](output_format chosen) { format = chosen; },
+        "table, json (one document per line) or raw (as received); default: table on a terminal, otherwise json");
 }
 
 void add_json_option(CLI::App& command, bool& json, const std::string& documents) {
-    command
-        .add_option_function<std::string>(
-            "-o,--output", [&json](const std::string& name) { json = name == "json"; },
-            "text, or json: " + documents + " (default text)")
-        ->type_name("FORMAT")
-        ->check(CLI::IsMember({"text", "json"}).description(""));
+    add_format(
+        command, [&json](output_format chosen) { json = chosen != output_format::table; },
+        "table, json or raw: " + documents + " (default table)");
 }
 
 output_format resolved(output_format format) {

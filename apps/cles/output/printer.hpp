@@ -17,7 +17,7 @@ enum class output_format { automatic, table, json, raw };
 /// -o: table, json or raw.
 void add_output_option(CLI::App& command, output_format& format);
 
-/// -o: text or json.
+/// -o of commands whose table is text, also if it is not on a terminal, and whose documents are their own.
 void add_json_option(CLI::App& command, bool& json, const std::string& documents);
 
 /// The format, where `automatic` means a table on a terminal, and JSON otherwise.

@@ -7,6 +7,7 @@
 #include "client/member_key.hpp"
 #include "commands.hpp"
 #include "options/addresses.hpp"
+#include "options/duration.hpp"
 #include "options/keys_option.hpp"
 #include "output/errors.hpp"
 #include "output/terminal.hpp"
@@ -43,9 +44,9 @@ struct serve_arguments {
     std::vector<std::string> networks;
     multicast_option multicast;
     double rate = 10;
-    int busy_poll_us = 0;
+    std::chrono::microseconds busy_poll{0};
     int real_time = 0;
-    std::optional<int> wake_within_us;
+    std::optional<std::chrono::microseconds> wake_within;
 };
 
 cles::service_options options_of(const serve_arguments& args, const cles::log_sink& log) {
@@ -79,8 +80,8 @@ cles::service_options options_of(const serve_arguments& args, const cles::log_si
 int serve(const serve_arguments& args, int verbosity) {
     const auto log = make_server_log(verbosity);
     std::optional<cles::wake_bound> latency_limit;
-    if (args.wake_within_us) {
-        latency_limit.emplace(std::chrono::microseconds{*args.wake_within_us});
+    if (args.wake_within) {
+        latency_limit.emplace(*args.wake_within);
     }
     asio::io_context io{1};
     asio::signal_set signals{io, SIGINT, SIGTERM};
@@ -111,9 +112,7 @@ int serve(const serve_arguments& args, int verbosity) {
         line.append(" listening on ").append(endpoint).push_back('\n');
         write_output(line);
     }
-    cles::run(io, {.busy_poll = std::chrono::microseconds{args.busy_poll_us},
-                   .fifo_priority = args.real_time,
-                   .lock_memory = args.real_time != 0});
+    cles::run(io, {.busy_poll = args.busy_poll, .fifo_priority = args.real_time, .lock_memory = args.real_time != 0});
     return code;
 }
 
@@ -122,7 +121,7 @@ int serve(const serve_arguments& args, int verbosity) {
 void add_serve(CLI::App& app, context& shared) {
     auto args = std::make_shared<serve_arguments>();
     auto* command = app.add_subcommand("serve", "Run a node for experiments");
-    command->add_option("--name", args->name, "The name of the node (default: that of the key, otherwise car1)")
+    command->add_option("--name,--node", args->name, "The name of the node (default: that of the key, otherwise car1)")
         ->type_name("NAME");
     command
         ->add_option("--pool", args->pool, "The pool of the node; nodes of other pools are ignored (default CLES_POOL)")
@@ -139,21 +138,24 @@ void add_serve(CLI::App& app, context& shared) {
         ->type_name("HZ")
         ->check(CLI::Range(0.0, 1e6).description(""));
     command
-        ->add_option("--busy-poll", args->busy_poll_us,
-                     "Microseconds to poll for work before sleeping: faster replies, more processor time (default 0)")
-        ->type_name("US")
-        ->check(CLI::Range(0, 1'000'000).description(""));
+        ->add_option_function<std::string>(
+            "--busy-poll",
+            [args = args.get()](const std::string& text) { args->busy_poll = parse_wait("--busy-poll", text); },
+            "How long to poll for work before sleeping, 50us or microseconds: faster replies, more processor time "
+            "(default 0)")
+        ->type_name("TIME");
     command
         ->add_option("--real-time", args->real_time,
                      "Run under SCHED_FIFO with this priority, 1 to 99, with all memory locked")
         ->type_name("PRIO")
         ->check(CLI::Range(1, 99).description(""));
     command
-        ->add_option("--wake-within", args->wake_within_us,
-                     "Limit the wake-up latency of the processor to this many microseconds; 0: it never sleeps (needs "
-                     "/dev/cpu_dma_latency)")
-        ->type_name("US")
-        ->check(CLI::Range(0, 1'000'000).description(""));
+        ->add_option_function<std::string>(
+            "--wake-within",
+            [args = args.get()](const std::string& text) { args->wake_within = parse_wait("--wake-within", text); },
+            "Limit the wake-up latency of the processor to this time, 50us or microseconds; 0: it never sleeps (needs "
+            "/dev/cpu_dma_latency)")
+        ->type_name("TIME");
     command->add_flag("--insecure", args->insecure,
                       "Allow listening and multicast beyond this host, where anyone may send any request");
     command

@@ -26,6 +26,9 @@ constexpr auto footer =
     "  clesd --node sat1 --listen tcp://127.0.0.1:25370 --print-config\n"
     "  clesd --keys /etc/cles/keys";
 
+// "--listen" of "-l,--listen"
+std::string last_name_of(const std::string& names) { return names.substr(names.rfind("--")); }
+
 } // namespace
 
 std::variant<command_line_options, std::string> parse_command_line(int argc, const char* const* argv) {
@@ -36,7 +39,7 @@ std::variant<command_line_options, std::string> parse_command_line(int argc, con
     app.set_version_flag("--version", "clesd " + std::string{cles::version});
     // Overrides a setting of the file.
     const auto add_setting = [&](const char* key, const std::string& names, const char* type, const char* text) {
-        auto record = [&wanted, key, source = names.substr(names.find("--"))](const CLI::results_t& texts) {
+        auto record = [&wanted, key, source = last_name_of(names)](const CLI::results_t& texts) {
             wanted.flags.push_back({key, texts, source});
             return true;
         };
@@ -55,7 +58,7 @@ std::variant<command_line_options, std::string> parse_command_line(int argc, con
     app.add_flag("--check", wanted.check, "Only check whether the configuration can be used");
     app.add_flag("--print-config", wanted.print_config,
                  "Only print the configuration, and where each value comes from");
-    add_setting("node", "--node", "NAME", "The name of the node");
+    add_setting("node", "--name,--node", "NAME", "The name of the node");
     add_setting("pool", "--pool", "NAME", "The pool that the node belongs to; nodes of other pools are ignored");
     const auto* clash_option =
         app.add_flag("--allow-clash", allow_clash, "Continue if another live node had the name first");
@@ -65,7 +68,7 @@ std::variant<command_line_options, std::string> parse_command_line(int argc, con
         ->multi_option_policy(take_all);
     add_setting("multicast", "-m,--multicast", "IFACE[,IFACE...][,GROUP[:PORT]]|auto|off",
                 "The interfaces on which other nodes are discovered");
-    add_setting("security", "--keys", "DIR", "The node's key directory: authenticates and encrypts");
+    add_setting("security", "-k,--keys", "DIR", "The node's key directory: authenticates and encrypts");
     add_setting("log", "--log", "LEVEL[,FORMAT]",
                 "The level and format of the log: debug, info, warning, error; text, json");
     try {

@@ -55,6 +55,15 @@ BOOST_AUTO_TEST_CASE(every_flag) {
     BOOST_TEST(of(wanted.flags, "log").texts.at(0) == "debug,json");
 }
 
+// Those of `cles serve` are accepted too.
+BOOST_AUTO_TEST_CASE(other_names_of_flags) {
+    const auto wanted = std::get<cles::runtime::command_line_options>(parse({"--name", "sat1", "-k", "keys"}));
+    BOOST_TEST(of(wanted.flags, "node").texts.at(0) == "sat1");
+    BOOST_TEST(of(wanted.flags, "node").source == "--node");
+    BOOST_TEST(of(wanted.flags, "security").texts.at(0) == "keys");
+    BOOST_TEST(of(wanted.flags, "security").source == "--keys");
+}
+
 BOOST_AUTO_TEST_CASE(help_and_version_are_printed) {
     BOOST_TEST(std::get<std::string>(parse({"--version"})) == "clesd " + std::string{cles::version} + "\n");
     BOOST_TEST(std::get<std::string>(parse({"--help"})).find("--print-config") != std::string::npos);
