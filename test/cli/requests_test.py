@@ -134,7 +134,9 @@ class Failures(NodeTest):
         self.check(("bind", "car1:echo"), 3, "no_task: ")
 
     def test_no_target(self):
-        self.check(("pull", "car2:localization"), 3, "no_target: ")
+        code, out, err = self.run_at("pull", "car2:localization")
+        self.assertEqual((code, out), (3, ""), err)
+        self.assertRegex(err, r"^cles: no_target: .*\ncles: cles ls --at URL lists .*\n$")
 
     def test_failed(self):
         self.check(("delegate", "car1:fail"), 5, "failed: car1: this task always fails")

@@ -30,7 +30,9 @@ class Router(unittest.TestCase):
         daemon = subprocess.Popen([CLESD, "--config", config], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                                   stderr=subprocess.DEVNULL, text=True, env=self.env)
         self.addCleanup(lambda: (daemon.terminate(), finish(daemon)))
-        self.assertIn("listening", read_line(daemon))
+        line = read_line(daemon)
+        self.assertIn("listening", line)
+        return line.split()[-1]
 
     def run_ok(self, *arguments):
         code, out, err = cles(*arguments, env=self.env)
@@ -48,7 +50,15 @@ class Router(unittest.TestCase):
         self.start_daemon("sat1")
         code, out, err = cles("pull", "any:nothing", env=self.env)
         self.assertEqual((code, out), (3, ""), err)
-        self.assertIn("nothing", err)
+        self.assertEqual(err, "cles: no_target: sat1: no known node offers PULL 'nothing'\n")  # a router has answered
+
+    def test_whom_a_router_does_not_know(self):
+        url = self.start_daemon("sat1")
+        code, out, err = cles("pull", "car9:nothing", "--at", url, env=self.env)
+        self.assertEqual((code, out), (3, ""), err)
+        self.assertNotIn("give its URL", err)
+        self.assertIn("PULL sat1:cles/peers lists the nodes that it knows\n", err)
+        self.assertIn("cles: cles ls --at URL lists the nodes that the node there knows\n", err)
 
     def test_nobody_routes(self):
         code, out, err = cles("pull", "any:localization", env=self.env)

@@ -14,6 +14,7 @@
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdlib>
 #include <exception>
@@ -87,7 +88,12 @@ client::client(const address_book& addresses, int verbosity, bool in_group)
 
 cles::call_options client::options_for(std::string_view noun, std::optional<std::chrono::milliseconds> limit) const {
     cles::call_options options;
-    const auto url = addresses_.url_for(noun.substr(0, noun.find(':')));
+    const auto target = noun.substr(0, noun.find(':'));
+    auto url = addresses_.url_for(target);
+    if (url.empty() && target == node_.name()) { // the node whose key this is, not this command
+        url = addresses_.endpoint_of(target);
+        url = url.empty() ? std::string{addresses_.default_node()} : url;
+    }
     if (!url.empty()) {
         options.at(url);
     }
@@ -121,6 +127,7 @@ int client::run(asio::awaitable<void> work) {
                        thrown = std::move(failure);
                        if (has_code(thrown, cles::errc::no_target)) {
                            suggest_node();
+                           suggest_address();
                        }
                        // Cancellations of requests are still sent; nothing else is waited for.
                        node_.stop();
@@ -136,13 +143,6 @@ int client::run(asio::awaitable<void> work) {
         return exit_code::success;
     }
     const auto code = report_failure(thrown);
-    if (code == exit_code::not_found && addresses_.finds_by_name() && has_code(thrown, cles::errc::no_target)) {
-        const auto node = target_of(noun_);
-        hint_ += hint_.empty() ? "" : " ";
-        hint_ += node == "any" || node == "all"
-                     ? "any: and all: need a node that routes, such as clesd; set its address with --at URL"
-                     : "cles ls lists the nodes; --at URL or --peer NAME=URL sets the address of another one";
-    }
     if (!hint_.empty()) {
         note(hint_);
     }
@@ -214,6 +214,26 @@ void client::suggest_node() {
     if (const auto match = closest_match(target_of(noun_), names); !match.empty()) {
         hint_ = "did you mean '" + match + "'?";
     }
+}
+
+// Only what the user has not done yet: if a node has answered, an address is not what is missing.
+void client::suggest_address() {
+    const auto target = target_of(noun_);
+    std::string hint;
+    if (!addresses_.finds_by_name()) {
+        const bool has_asked_another =
+            addresses_.has_url() && !target.empty() && target != "self" && target != "any" && target != "all";
+        hint = has_asked_another ? "cles ls --at URL lists the nodes that the node there knows" : "";
+    } else if (target == "any" || target == "all") {
+        const auto known = node_.peers();
+        const bool has_router =
+            std::ranges::any_of(known, [](const cles::peer& node) { return node.load.workers != 0; });
+        hint = has_router ? "" : "any: and all: need a node that routes, such as clesd; set its address with --at URL";
+    } else if (endpoint_of(target).empty()) {
+        hint = "cles ls lists the nodes; --at URL or --peer NAME=URL sets the address of another one";
+    }
+    hint_ += hint_.empty() || hint.empty() ? "" : " ";
+    hint_ += hint;
 }
 
 std::string client::endpoint_of(std::string_view node) const {

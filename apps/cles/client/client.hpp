@@ -56,6 +56,7 @@ class client {
     boost::asio::awaitable<void> run_explained(boost::asio::awaitable<void> work);
     boost::asio::awaitable<void> suggest_task();
     void suggest_node();
+    void suggest_address();
     [[nodiscard]] bool may_have_asked_secured_node(const std::exception_ptr& thrown) const;
     void wait_for_signal();
     void watch_output();

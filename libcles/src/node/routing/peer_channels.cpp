@@ -372,8 +372,12 @@ peer_channels::place peer_channels::place_of(std::string_view target, const forw
             return {std::move(address), {}};
         }
     }
-    throw error(errc::no_target, own_name + " cannot find '" + std::string{target} +
-                                     "': " + discovery.unknown_reason() + "give its URL");
+    // Who asks a node that routes has given a URL: that of the node that routes.
+    const auto advice = host_.node().active_router == nullptr
+                            ? std::string{"give its URL"}
+                            : "PULL " + own_name + ":cles/peers lists the nodes that it knows";
+    throw error(errc::no_target,
+                own_name + " cannot find '" + std::string{target} + "': " + discovery.unknown_reason() + advice);
 }
 
 std::optional<peer_channels::place> peer_channels::discovered_place_of(std::string_view target,
