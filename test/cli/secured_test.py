@@ -22,6 +22,7 @@ class Secured(Trust):
 
     def setUp(self):
         super().setUp()
+        self.logs = {}
         self.group = f"lo,239.255.0.7:{free_port()}"
         self.good("fleet", "init", "fleet", "--with", "car1,car2,operator")
         self.car1 = self.serve("car1", "-l", f"unix://{self.path('car1.sock')}")
@@ -36,6 +37,7 @@ class Secured(Trust):
         process = start("serve", "-k", f"fleet/{name}", "-l", "tls://127.0.0.1:0", "--rate", "0", *more,
                         cwd=self.scratch, env=environment(CLES_MULTICAST=self.group))
         self.addCleanup(self.end, process)
+        self.logs[name] = process
         found = re.fullmatch(rf"{name} listening on (tls://127\.0\.0\.1:\d+)\n", read_line(process))
         self.assertTrue(found)
         return found[1]
@@ -43,6 +45,14 @@ class Secured(Trust):
     def end(self, process):
         process.send_signal(signal.SIGTERM)
         self.assertEqual(finish(process)[0], 0)
+
+    def logged(self, name, text):
+        """The line of the node's log that contains the text."""
+        process = self.logs[name]
+        while line := read_line(process, process.stderr):
+            if text in line:
+                return line
+        raise AssertionError(f"it ended, and did not log '{text}'")
 
     def names(self, *arguments):
         return [node["node"] for node in json.loads(self.good("ls", *arguments, "-o", "json").out)["peers"]]
@@ -83,6 +93,32 @@ class Secured(Trust):
         os.chmod(self.path("fleet/car1/rules"), 0o600)
         wait_until(lambda: self.run_in("pull", "car1:echo/7", "-k", "fleet/operator").code == 5, "it is denied")
         self.assertIn("denied", self.run_in("pull", "car1:echo/7", "-k", "fleet/operator").err)
+
+    def test_the_key_of_a_node_asks_that_node(self):
+        self.serve("car2")
+        at = ("--peer", f"car1={self.car1}")
+        self.assertEqual(self.good("pull", "car1:echo/7", "-k", "fleet/car1", *at).out, ECHO)
+        self.assertEqual(self.names("-k", "fleet/car1"), ["car1", "car2"])
+        states = json.loads(self.good("ls", "-k", "fleet/car1", "-o", "json").out)["peers"]
+        self.assertEqual([node["state"] for node in states], ["live", "live"])
+
+    def test_a_denial_names_the_whole_noun_here_and_in_the_log(self):
+        self.good("fleet", "rights", "operator", "--may", "pull,bind *:cles", "-k", "fleet")
+        for name in ("car1", "operator"):
+            self.good("keys", "join", "fleet/roster", "-k", f"fleet/{name}")
+        self.good("pull", "car1:cles", "-k", "fleet/operator", "--at", self.car1)
+        says = "operator may not send PULL 'cles/metrics' to car1"
+        self.ends_with(5, "pull", "car1:cles/metrics", "-k", "fleet/operator", "--at", self.car1, says=says)
+        self.ends_with(5, "pull", "self:cles/metrics", "-k", "fleet/operator", "--at", self.car1,
+                       says="car1 does not allow PULL 'cles/metrics'")
+        line = self.logged("car1", "denied PULL 'cles/metrics' of operator: ")
+        self.assertRegex(line, r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}[+-]\d\d:\d\d info ")
+
+    def test_the_log_names_the_address_and_the_key_of_a_stranger(self):
+        self.good("fleet", "init", "other", "--with", "stranger")
+        key = json.loads(self.good("keys", "show", "-k", "other/stranger", "-o", "json").out)["key"]
+        self.failed("pull", "self:cles", "-k", "other/stranger", "--at", self.car1, says="refuses this node")
+        self.assertIn(f"(127.0.0.1, key {key})", self.logged("car1", "not in roster"))
 
     @unittest.skipIf(not os.path.exists(CLES + "-bench"), "cles-bench is not built")
     def test_a_measurement(self):

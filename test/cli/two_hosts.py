@@ -7,6 +7,8 @@ import shutil
 import subprocess
 import unittest
 
+from support import wait_until
+
 
 def cannot_be_made(why):
     """If everything has to be tested, that is a failure."""
@@ -33,10 +35,12 @@ class Hosts:
                 self._ip(host, "address", "add", address, "dev", name)
                 self._ip(host, "link", "set", name, "up")
                 self._ip(host, "link", "set", "lo", "up")
+            for host, name in ((self.near, near[0]), (self.far, far[0])):
+                wait_until(lambda at=host, of=name: "LOWER_UP" in self._ip(at, "link", "show", of), f"{name} has a link")
         except (subprocess.CalledProcessError, OSError) as failure:
             self.close()
-            words = getattr(failure, "stderr", None) or b""
-            cannot_be_made(f"no network namespaces here: {failure} {words.decode(errors='replace').strip()}")
+            words = getattr(failure, "stderr", None) or ""
+            cannot_be_made(f"no network namespaces here: {failure} {words.strip()}")
 
     def _keep(self, command):
         """A process in a separate namespace, which keeps it alive."""
@@ -54,7 +58,7 @@ class Hosts:
         return ["nsenter", *user, "--net", f"--target={host}"]
 
     def _ip(self, host, *arguments):
-        subprocess.run([*self.inside(host), "ip", *arguments], check=True, capture_output=True)
+        return subprocess.run([*self.inside(host), "ip", *arguments], check=True, capture_output=True, text=True).stdout
 
     def close(self):
         for keeper in reversed(self.keepers):

@@ -57,6 +57,34 @@ class TwoHosts(unittest.TestCase):
         code, out, err = self.run_at(self.hosts.far, "bind", "car1:localization", "-n", "3", "-o", "raw")
         self.assertEqual((code, len(out.splitlines()), err), (0, 3, ""))
 
+    def test_addresses_are_those_of_use_where_one_asks(self):
+        _, (_, port) = self.serve(self.hosts.near, "car6", "unix://@car6", "tcp://127.0.0.1:0", "tcp://0.0.0.0:0")
+        self.serve(self.hosts.near, "car7", "tcp://127.0.0.1:0")
+        at = f"tcp://10.77.0.1:{port}"
+
+        def info(host, *arguments):
+            code, out, err = self.run_at(host, "info", "--at", at, *arguments)
+            self.assertEqual((code, err), (0, ""))
+            return out
+
+        self.assertEqual(json.loads(info(self.hosts.far, "-o", "json"))["endpoints"][0], at)
+        self.assertIn(f"endpoints  {at}\n", info(self.hosts.far, "-o", "table"))
+        self.assertIn(f"tcp://0.0.0.0:{port}", info(self.hosts.far, "-o", "raw"))  # as received
+        self.assertIn(f"tcp://0.0.0.0:{port}", info(self.hosts.near, "-o", "table"))
+        listed = {}
+
+        def knows_both():
+            code, out, err = self.run_at(self.hosts.far, "ls", "--at", at, "-l", "-o", "json")
+            self.assertEqual((code, err), (0, ""))
+            listed.update({p["node"]: p for p in json.loads(out)["peers"]})
+            return "car7" in listed
+
+        wait_until(knows_both, "car6 knows of car7")
+        self.assertEqual(listed["car6"]["endpoints"][0], at)
+        self.assertIn("tasks", listed["car6"])
+        self.assertEqual(listed["car7"]["endpoints"], [])  # the loopback there is not the one here
+        self.assertIn("no address", listed["car7"]["failure"])
+
     def test_what_others_cannot_reach_is_not_announced(self):
         _, ports = self.serve(self.hosts.near, "car2", "tcp://127.0.0.1:0", "tcp://10.77.0.1:0", "unix://@car2")
         self.assertEqual([p["endpoints"] for p in self.peers_of(self.hosts.far)], [[f"tcp://10.77.0.1:{ports[1]}"]])

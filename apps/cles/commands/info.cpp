@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/json_reader.hpp>
+
 #include "client/client.hpp"
 #include "commands.hpp"
+#include "discovery/stated_endpoints.hpp"
+#include "options/arguments.hpp"
 #include "options/common_options.hpp"
 #include "options/duration.hpp"
 #include "output/printer.hpp"
@@ -12,10 +16,12 @@
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -96,14 +102,41 @@ std::string tasks_of(const node_document& node) {
     return out.text();
 }
 
+// The answer with its endpoints as they are of use here; unchanged if it has none.
+std::string as_seen_from_here(const std::string& answer, const std::string& asked) {
+    cles::json_reader reader{answer};
+    std::string_view key;
+    std::string_view stated;
+    if (reader.begin_object()) {
+        while (reader.next_key(key)) {
+            if (key == "endpoints") {
+                reader.read_raw(stated);
+                break;
+            }
+            if (!reader.skip()) {
+                break;
+            }
+        }
+    }
+    auto out = answer;
+    if (std::vector<std::string> endpoints; !stated.empty() && cles::from_json(stated, endpoints)) {
+        out.replace(static_cast<std::size_t>(stated.data() - answer.data()), stated.size(),
+                    cles::to_json(endpoints_from_here(asked, std::move(endpoints))));
+    }
+    return out;
+}
+
 asio::awaitable<void> show(client& requester, const info_arguments& args) {
     const auto options = requester.options_for(args.noun, args.timeout);
     const cles::json_text answer = co_await requester.node().async_pull(args.noun, options);
+    const auto seen = args.format == output_format::raw
+                          ? answer.text
+                          : as_seen_from_here(answer.text, requester.endpoint_of(target_of(args.noun)));
     if (resolved(args.format) == output_format::table) {
-        const auto node = cles::from_json<node_document>(answer.text);
+        const auto node = cles::from_json<node_document>(seen);
         write_output(details_of(node) + (node.tasks.empty() ? "" : "\n" + tasks_of(node)));
     } else {
-        printer{args.format, false}.print(answer.text);
+        printer{args.format, false}.print(seen);
     }
 }
 

@@ -34,6 +34,7 @@ class parallel_query : public std::enable_shared_from_this<parallel_query> {
         options.at(url).deadline(limit).diagnostics(answer.error);
         const auto on_answer = [self = shared_from_this(), &answer](boost::system::error_code code,
                                                                     const cles::json_text& text) {
+            answer.code = code;
             if (!code) {
                 answer.error.clear();
                 answer.json = text.text;

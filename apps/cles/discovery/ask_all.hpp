@@ -2,6 +2,7 @@
 #pragma once
 
 #include <boost/asio/awaitable.hpp>
+#include <boost/system/error_code.hpp>
 
 #include <chrono>
 #include <string>
@@ -14,6 +15,7 @@ class client;
 struct node_answer {
     std::string json;  ///< empty if it failed
     std::string error; ///< why
+    boost::system::error_code code;
 };
 
 /// PULLs a noun from each URL, in parallel. The answers are in the order of the URLs. An empty URL stands for a node

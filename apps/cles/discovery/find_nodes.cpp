@@ -36,16 +36,17 @@ asio::awaitable<std::vector<listed_node>> find_by_multicast(client& requester, s
     while (requester.node().peers().empty() && steady::now() < until) {
         co_await requester.sleep_until(std::min(until, steady::now() + 2ms));
     }
-    auto nodes = nodes_of(requester.node().peers());
+    auto nodes = heard_nodes(requester);
     const auto usable = std::find_if(nodes.begin(), nodes.end(), [](const listed_node& node) {
         return node.state == "live" && !node.endpoints.empty();
     });
     if (usable != nodes.end()) {
-        std::vector<std::string> url{usable->url()};
+        const auto asked = usable->url();
+        std::vector<std::string> url{asked};
         const auto answers = co_await ask_all(requester, "self:cles/peers", std::move(url), time_left(until));
-        add_unknown(nodes, nodes_of(requester.node().peers()));
+        add_unknown(nodes, heard_nodes(requester));
         if (answers.front().error.empty()) {
-            add_unknown(nodes, peers_in(answers.front().json));
+            add_unknown(nodes, peers_in(asked, answers.front().json));
         }
     }
     co_return nodes;
@@ -63,12 +64,12 @@ asio::awaitable<std::vector<listed_node>> find_nodes(client& requester, const ad
                                                      std::optional<std::chrono::milliseconds> timeout) {
     if (addresses.finds_by_name()) {
         co_await requester.sleep_until(until);
-        co_return nodes_of(requester.node().peers());
+        co_return heard_nodes(requester);
     }
     const auto options = requester.options_for("self:cles", timeout);
     const cles::json_text self = co_await requester.node().async_pull("self:cles", options);
     const cles::json_text peers = co_await requester.node().async_pull("self:cles/peers", options);
-    co_return nodes_of(self.text, peers.text);
+    co_return nodes_of(addresses.url_for("self"), self.text, peers.text);
 }
 
 asio::awaitable<std::vector<listed_node>> find_nodes_quickly(client& requester, const address_book& addresses,
@@ -121,6 +122,17 @@ asio::awaitable<std::vector<std::string>> possible_routers(client& requester, co
         urls.emplace_back(addresses.default_node());
     }
     co_return urls;
+}
+
+std::vector<listed_node> heard_nodes(client& requester) {
+    auto nodes = nodes_of(requester.node().peers());
+    for (auto& node : nodes) {
+        // The command answers nobody, so it takes nothing from the node with its name.
+        if (node.node == requester.node().name() && node.state == "clash") {
+            node.state = "live";
+        }
+    }
+    return nodes;
 }
 
 std::chrono::milliseconds time_left(steady::time_point until) {

@@ -30,6 +30,10 @@ boost::asio::awaitable<std::vector<listed_node>> find_nodes(client& requester, c
 boost::asio::awaitable<std::vector<listed_node>> find_nodes_quickly(client& requester, const address_book& addresses,
                                                                     std::chrono::steady_clock::time_point until);
 
+/// The nodes whose announcements the command has received. A node whose key the command uses is not in conflict with
+/// it.
+std::vector<listed_node> heard_nodes(client& requester);
+
 /// Whether the noun starts with `any:` or `all:` and no address is given: a node that routes has to be found.
 bool needs_router(const address_book& addresses, std::string_view noun);
 

@@ -6,6 +6,7 @@
 #include <cles/verb.hpp>
 
 #include "client/offered_tasks.hpp"
+#include "discovery/stated_endpoints.hpp"
 #include "options/duration.hpp"
 #include "output/json_node.hpp"
 
@@ -111,28 +112,28 @@ std::vector<listed_node> nodes_of(const std::vector<cles::peer>& peers) {
     return nodes;
 }
 
-std::vector<listed_node> nodes_of(std::string_view self, std::string_view peers) {
+std::vector<listed_node> nodes_of(std::string_view asked, std::string_view self, std::string_view peers) {
     const auto document = cles::from_json<self_document>(self);
     std::vector<listed_node> nodes{{.node = document.node,
                                     .state = "live",
                                     .age_ms = {},
-                                    .endpoints = document.endpoints,
+                                    .endpoints = endpoints_from_here(asked, document.endpoints),
                                     .epoch = document.epoch}};
     if (document.load) {
         nodes.front().load = document.load->value();
     }
-    auto known = peers_in(peers);
+    auto known = peers_in(asked, peers);
     nodes.insert(nodes.end(), std::make_move_iterator(known.begin()), std::make_move_iterator(known.end()));
     return nodes;
 }
 
-std::vector<listed_node> peers_in(std::string_view peers) {
+std::vector<listed_node> peers_in(std::string_view asked, std::string_view peers) {
     std::vector<listed_node> nodes;
     for (const auto& p : cles::from_json<peers_document>(peers).peers) {
         nodes.push_back({.node = p.node,
                          .state = p.state,
                          .age_ms = p.age_ms,
-                         .endpoints = p.endpoints,
+                         .endpoints = known_endpoints_from_here(asked, p.endpoints),
                          .epoch = p.epoch,
                          .load = p.load.value(),
                          .hops = p.hops.value_or(1),

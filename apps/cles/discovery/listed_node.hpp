@@ -38,10 +38,11 @@ struct listed_node {
 };
 
 std::vector<listed_node> nodes_of(const std::vector<cles::peer>& peers);
-/// From a node's answers to PULL self:cles and self:cles/peers. \throws cles::error with `conversion`
-std::vector<listed_node> nodes_of(std::string_view self, std::string_view peers);
+/// From a node's answers to PULL self:cles and self:cles/peers, with addresses as they are of use here.
+/// \param asked where the node was asked \throws cles::error with `conversion`
+std::vector<listed_node> nodes_of(std::string_view asked, std::string_view self, std::string_view peers);
 /// From its answer to PULL self:cles/peers alone. \throws cles::error with `conversion`
-std::vector<listed_node> peers_in(std::string_view peers);
+std::vector<listed_node> peers_in(std::string_view asked, std::string_view peers);
 
 /// The address of each.
 std::vector<std::string> urls_of(const std::vector<listed_node>& nodes);

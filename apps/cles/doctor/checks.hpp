@@ -21,6 +21,10 @@ struct listed_node;
 /// How long a check waits for a node's answer.
 inline constexpr std::chrono::seconds query_timeout{1};
 
+/// What to do if a node denies this key what the checks ask.
+inline constexpr const char* advice_on_denial =
+    "permit it at the fleet's authority (cles fleet rights NAME --may LIST); cles access says which line decides";
+
 enum class verdict : std::uint8_t { ok, warning, failure };
 
 /// What a check of `cles doctor` found.
@@ -56,17 +60,25 @@ void check_configuration(findings& found);
 /// The key directory of the command, unless its name is empty. \return whether it can be used
 bool check_keys(const std::string& directory, findings& found);
 
-/// The interfaces of this host, and those that multicast uses.
-void check_interfaces(const cles::multicast_options& group, findings& found);
+/// The interfaces of this host, and those that multicast uses. `secured`: nodes are to have security.
+void check_interfaces(const cles::multicast_options& group, bool secured, findings& found);
 
 /// Sends a datagram to the group on each interface, and waits for it. \return the interfaces on which it was received
 std::vector<std::string> check_multicast(const cles::multicast_options& group, findings& found);
 
 /// Whether the default ports of nodes are free, or used by nodes; with --at, which node is there.
-boost::asio::awaitable<void> check_ports(client& requester, const address_book& addresses, findings& found);
+/// \return the address of a node that was found so; empty if there is none
+boost::asio::awaitable<std::string> check_ports(client& requester, const address_book& addresses, findings& found);
+
+/// What earlier checks found that tells why no node announces itself.
+struct known_before {
+    bool nobody_listens = false; ///< to the group, which is on loopback only
+    std::string at_port{};       ///< what `check_ports` returned
+};
 
 /// Whether the nodes that announce themselves answer, have unique names, the same roster, and the time of this host.
-boost::asio::awaitable<void> check_nodes(client& requester, const address_book& addresses, findings& found);
+boost::asio::awaitable<void> check_nodes(client& requester, const address_book& addresses, const known_before& known,
+                                         findings& found);
 
 /// Of the nodes that are bridges to other pools: whether they are connected to NATS, how long a message takes there and
 /// back, and whether the pools can be reached.

@@ -12,6 +12,8 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <tuple>
+#include <utility>
 #include <vector>
 
 #include <fcntl.h>
@@ -61,20 +63,38 @@ class pipe_ends {
     std::array<int, 2> ends_{-1, -1};
 };
 
-pid_t spawn(const std::vector<std::string>& arguments, int output) {
-    std::vector<char*> argv;
-    argv.reserve(arguments.size() + 1);
-    for (const auto& each : arguments) {
-        argv.push_back(const_cast<char*>(each.c_str())); // posix_spawn does not change them
+std::vector<char*> pointers_to(const std::vector<std::string>& texts) {
+    std::vector<char*> out;
+    out.reserve(texts.size() + 1);
+    for (const auto& each : texts) {
+        out.push_back(const_cast<char*>(each.c_str())); // posix_spawn does not change them
     }
-    argv.push_back(nullptr);
+    out.push_back(nullptr);
+    return out;
+}
+
+// The environment of this program, without a variable.
+std::vector<std::string> environment_without(std::string_view variable) {
+    std::vector<std::string> out;
+    for (char** each = environ; *each != nullptr; ++each) {
+        const std::string_view entry{*each};
+        if (variable.empty() || entry.substr(0, entry.find('=')) != variable) {
+            out.emplace_back(entry);
+        }
+    }
+    return out;
+}
+
+pid_t spawn(const std::vector<std::string>& arguments, const std::vector<std::string>& environment, int output) {
+    auto argv = pointers_to(arguments);
+    auto variables = pointers_to(environment);
     posix_spawn_file_actions_t files{};
     ::posix_spawn_file_actions_init(&files);
     ::posix_spawn_file_actions_addopen(&files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
     ::posix_spawn_file_actions_adddup2(&files, output, STDOUT_FILENO);
     ::posix_spawn_file_actions_adddup2(&files, output, STDERR_FILENO);
     pid_t child = 0;
-    const int code = ::posix_spawn(&child, argv.front(), &files, nullptr, argv.data(), environ);
+    const int code = ::posix_spawn(&child, argv.front(), &files, nullptr, argv.data(), variables.data());
     ::posix_spawn_file_actions_destroy(&files);
     if (code != 0) {
         throw_system_error(code);
@@ -109,9 +129,10 @@ struct program_result {
 
 // Runs a program, the first of the arguments; it is killed at the time limit.
 // Throws std::system_error if it cannot be started.
-program_result run_program(const std::vector<std::string>& arguments, std::chrono::milliseconds limit) {
+program_result run_program(const std::vector<std::string>& arguments, const std::vector<std::string>& environment,
+                           std::chrono::milliseconds limit) {
     pipe_ends output;
-    const auto child = spawn(arguments, output.writer());
+    const auto child = spawn(arguments, environment, output.writer());
     output.close_writer();
     std::string text;
     if (!read_all(output.reader(), steady::now() + limit, text)) {
@@ -161,7 +182,18 @@ void check_configuration(findings& found) {
         return;
     }
     try {
-        auto [code, lines] = run_program({program, "--check"}, check_limit);
+        auto [code, lines] = run_program({program, "--check"}, environment_without(""), check_limit);
+        // The variable is also that of the commands, for which it needs no permission.
+        const char* group = std::getenv("CLES_MULTICAST");
+        std::string advice;
+        if (code > 0 && group != nullptr && *group != '\0' && !lines.empty()) {
+            auto without = run_program({program, "--check"}, environment_without("CLES_MULTICAST"), check_limit);
+            if (without.code == 0) {
+                advice = "with CLES_MULTICAST=" + std::string{group} +
+                         " in its environment, it does not start: " + lines.front();
+                std::tie(code, lines) = std::pair{without.code, without.lines};
+            }
+        }
         // The lines before the last one are about plugins without which the daemon starts.
         while (code == 0 && lines.size() > 1 && lines.front().ends_with(not_required)) {
             found.warning("config", lines.front(), "correct it, or remove it from the configuration");
@@ -169,7 +201,7 @@ void check_configuration(findings& found) {
         }
         const auto text = lines.empty() ? std::string{} : lines.front();
         if (code == 0) {
-            found.ok("config", "clesd: " + text);
+            found.ok("config", "clesd: " + text, advice);
         } else if (code == -1) {
             found.failure("config", "clesd --check did not end by itself", "run " + program);
         } else {

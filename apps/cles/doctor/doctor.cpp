@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/error.hpp>
 #include <cles/json_writer.hpp>
 
 #include "client/client.hpp"
 #include "commands.hpp"
+#include "discovery/host.hpp"
 #include "doctor/checks.hpp"
 #include "output/errors.hpp"
 #include "output/printer.hpp"
@@ -18,6 +20,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace tool {
 
@@ -96,9 +99,11 @@ std::string findings_json(const findings& found) {
     return out;
 }
 
-asio::awaitable<void> check_network(client& requester, const address_book& addresses, findings& found) {
-    co_await check_ports(requester, addresses, found);
-    co_await check_nodes(requester, addresses, found);
+asio::awaitable<void> check_network(client& requester, const address_book& addresses, known_before& known,
+                                    findings& found) {
+    auto at_port = co_await check_ports(requester, addresses, found);
+    known.at_port = std::move(at_port);
+    co_await check_nodes(requester, addresses, known, found);
 }
 
 int run_checks(doctor_arguments& args, int verbosity) {
@@ -107,15 +112,20 @@ int run_checks(doctor_arguments& args, int verbosity) {
     check_configuration(found);
     const bool can_ask = check_keys(args.addresses.keys(), found);
     const auto group = args.addresses.group();
-    check_interfaces(group, found);
+    check_interfaces(group, args.addresses.is_secured(), found);
     if (const auto usable = check_multicast(group, found); usable != cles::interfaces_of(group) || usable.empty()) {
         args.addresses.restrict_group_to(usable); // so that the remaining checks work
     }
     if (can_ask) {
-        client requester{args.addresses, verbosity};
-        const auto code = requester.run(check_network(requester, args.addresses, found));
-        if (code != exit_code::success) {
-            return code; // interrupted
+        try {
+            known_before known{.nobody_listens = group.is_on() && has_no_listener(args.addresses.group())};
+            client requester{args.addresses, verbosity};
+            const auto code = requester.run(check_network(requester, args.addresses, known, found));
+            if (code != exit_code::success) {
+                return code; // interrupted
+            }
+        } catch (const cles::error& e) { // of this host, of which other checks have told
+            found.failure("nodes", "no node can be asked: " + e.message(), "correct what else is reported here");
         }
     }
     check_clock(found);

@@ -30,14 +30,19 @@ const network_interface* external_interface(const std::vector<network_interface>
 
 // What both hosts need to work together over this interface.
 std::string advice_for_other_hosts(const network_interface& interface, const std::string& selection,
-                                   const cles::multicast_options& group) {
+                                   const cles::multicast_options& group, bool secured) {
+    if (secured) {
+        return "to reach other hosts: " + (selection == "auto" ? "" : "CLES_MULTICAST=" + selection + ", ") +
+               "nodes with --keys and --listen tls://" + interface.address + ", UDP port " +
+               std::to_string(group.port) + " and the TCP ports of the nodes open";
+    }
     return "to reach other hosts: CLES_MULTICAST=" + selection +
            " (on each its own interface), nodes with --listen tcp://" + interface.address +
            " --insecure, and UDP port " + std::to_string(group.port) + " open";
 }
 
 void check_interface(const std::string& name, const cles::multicast_options& group,
-                     const std::vector<network_interface>& all, findings& found) {
+                     const std::vector<network_interface>& all, bool secured, findings& found) {
     const auto used = "multicast is configured for " + name;
     const auto* interface = find_interface(all, name);
     if (interface == nullptr) {
@@ -55,20 +60,21 @@ void check_interface(const std::string& name, const cles::multicast_options& gro
     } else if (interface->loopback) {
         const auto* other = external_interface(all);
         found.ok("interfaces", "multicast uses " + name + ": only nodes on this host find each other",
-                 other == nullptr ? "" : advice_for_other_hosts(*other, other->name, group));
+                 other == nullptr ? "" : advice_for_other_hosts(*other, other->name, group, secured));
     } else {
-        found.ok("interfaces", "multicast uses " + name, advice_for_other_hosts(*interface, group.interface, group));
+        found.ok("interfaces", "multicast uses " + name,
+                 advice_for_other_hosts(*interface, group.interface, group, secured));
     }
 }
 
 } // namespace
 
-void check_interfaces(const cles::multicast_options& group, findings& found) {
+void check_interfaces(const cles::multicast_options& group, bool secured, findings& found) {
     const auto all = network_interfaces();
     found.ok("interfaces", interfaces_text(all));
     const auto used = cles::interfaces_of(group);
     for (const auto& name : used) {
-        check_interface(name, group, all, found);
+        check_interface(name, group, all, secured, found);
     }
     if (group.is_on() && used.empty()) {
         found.failure("interfaces", "multicast is configured for 'auto', and no interface is up with an IPv4 address",

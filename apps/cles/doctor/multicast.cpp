@@ -117,6 +117,11 @@ std::string advice_on(const boost::system::error_code& code, const cles::multica
 
 bool check_group(const cles::multicast_options& group, const std::string& interface, findings& found) {
     const auto address = group.group + ":" + std::to_string(group.port);
+    const auto all = network_interfaces();
+    if (const auto* const used = find_interface(all, interface); used != nullptr && used->address.empty()) {
+        found.failure("multicast", "nodes cannot use " + interface + ", which has no IPv4 address", "assign one");
+        return false;
+    }
     std::string step;
     try {
         group_probe probe{group, interface, step};

@@ -5,6 +5,7 @@
 #include "client/client.hpp"
 #include "discovery/ask_all.hpp"
 #include "discovery/find_nodes.hpp"
+#include "discovery/host.hpp"
 #include "doctor/checks.hpp"
 #include "output/statistics.hpp"
 
@@ -30,11 +31,12 @@ using steady = std::chrono::steady_clock;
 
 namespace {
 
-constexpr auto announcement_time = 400ms; // until all nodes have announced themselves, with some reserve
+constexpr auto announcement_time = 400ms;      // until all nodes have announced themselves, with some reserve
+constexpr auto announcement_interval = 1300ms; // until those have that were not asked, in networks of up to 100 nodes
 constexpr double max_offset_s = 0.1;
 
 struct protocol_version {
-    int protocol = 1;
+    int protocol = 0; // every node states it
 };
 BOOST_DESCRIBE_STRUCT(protocol_version, (), (protocol))
 
@@ -43,13 +45,27 @@ struct time_of_day {
 };
 BOOST_DESCRIBE_STRUCT(time_of_day, (), (seconds))
 
-void check_node(const listed_node& node, const node_answer& answer, findings& found) {
+/// What the command's own node has counted in the group.
+struct heard_datagrams {
+    std::uint64_t datagrams_unsealed = 0;
+    std::uint64_t announcements_foreign = 0;
+    std::uint64_t group_dropped = 0;
+};
+BOOST_DESCRIBE_STRUCT(heard_datagrams, (), (datagrams_unsealed, announcements_foreign, group_dropped))
+
+void check_node(const listed_node& node, const node_answer& answer, bool secured, findings& found) {
     if (node.state == "clash") {
         return; // reported by check_names
     }
     if (node.endpoints.empty()) {
         found.warning("nodes", node.node + " does not listen at an address that is reachable from this host",
-                      "let it listen at an address of its network: --listen tcp://0.0.0.0 --insecure");
+                      secured ? "let it listen at an address of its network: --listen tls://0.0.0.0"
+                              : "let it listen at an address of its network: --listen tcp://0.0.0.0 --insecure");
+    } else if (answer.code == cles::errc::denied && secured) {
+        found.failure("nodes", node.node + " denies what nodes ask each other: " + answer.error, advice_on_denial);
+    } else if (answer.code == cles::errc::denied) {
+        found.warning("nodes", node.node + " denies what nodes ask each other: " + answer.error,
+                      "permit PULL 'cles' in its access rules");
     } else if (!answer.error.empty()) {
         found.failure("nodes",
                       node.node + " announces itself, but does not reply at " + node.url() + ": " + answer.error,
@@ -63,13 +79,18 @@ void check_node(const listed_node& node, const node_answer& answer, findings& fo
 void check_protocol(const listed_node& node, const std::string& description, findings& found) {
     try {
         const auto version = cles::from_json<protocol_version>(description).protocol;
-        if (version != 1) {
-            found.warning("nodes", node.node + " uses version " + std::to_string(version) + " of the protocol, not 1");
+        if (version == 1) {
+            return;
         }
-    } catch (const cles::error&) {
-        found.failure("nodes", "the reply of " + node.node + " does not describe a node",
-                      "check that " + node.url() + " is a CLES node");
+        if (version != 0) {
+            found.failure("nodes", node.node + " uses version " + std::to_string(version) + " of the protocol, not 1",
+                          "install the same version of CLES on both hosts");
+            return;
+        }
+    } catch (const cles::error&) { // as without a version
     }
+    found.failure("nodes", "the reply of " + node.node + " does not describe a node",
+                  "check that " + node.url() + " is a CLES node");
 }
 
 struct stated_roster {
@@ -156,9 +177,11 @@ asio::awaitable<void> check_names(client& requester, const std::vector<listed_no
     const auto answers = co_await ask_all(requester, "self:cles/peers", std::move(urls), query_timeout);
     std::map<std::string, std::string> conflicts; // by name: where the two are, if that is known
     note_conflicts(nodes, conflicts);
-    for (const auto& answer : answers) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
         try {
-            note_conflicts(answer.error.empty() ? peers_in(answer.json) : std::vector<listed_node>{}, conflicts);
+            note_conflicts(answers[i].error.empty() ? peers_in(nodes[i].url(), answers[i].json)
+                                                    : std::vector<listed_node>{},
+                           conflicts);
         } catch (const cles::error&) {
             continue; // check_protocol reports it
         }
@@ -200,29 +223,99 @@ asio::awaitable<void> compare_clocks(client& requester, const std::vector<listed
 }
 
 std::string count_text(std::size_t nodes) {
-    return nodes == 0 ? "no nodes found" : nodes == 1 ? "1 node found" : std::to_string(nodes) + " nodes found";
+    return nodes == 1 ? "1 node found" : std::to_string(nodes) + " nodes found";
+}
+
+bool is_on_loopback_only(const cles::multicast_options& group) {
+    const auto all = network_interfaces();
+    return std::ranges::all_of(cles::interfaces_of(group), [&](const std::string& name) {
+        const auto* const each = find_interface(all, name);
+        return each != nullptr && each->loopback;
+    });
+}
+
+asio::awaitable<heard_datagrams> count_heard(client& requester) {
+    heard_datagrams out;
+    try {
+        out = co_await requester.node().async_pull<heard_datagrams>(requester.node().name() + ":cles/metrics");
+    } catch (const cles::error&) { // then the numbers are not known
+        out = {};
+    }
+    co_return out;
+}
+
+// Nobody has announced itself. Whether that is as it should be depends on what was received instead.
+asio::awaitable<void> report_none(client& requester, const address_book& addresses, const known_before& known,
+                                  findings& found) {
+    const auto heard = co_await count_heard(requester);
+    const auto group = addresses.group();
+    const auto on = " on " + joined(cles::interfaces_of(group));
+    if (addresses.is_secured() && heard.datagrams_unsealed != 0) {
+        found.failure(
+            "nodes", "no nodes found" + on + ", but datagrams that this key cannot open",
+            "they are of another fleet, of a newer roster, or of nodes without security: compare the fleet and "
+            "the roster that cles keys show prints for their directories and for this one");
+    } else if (heard.announcements_foreign != 0) {
+        found.failure("nodes", "no nodes found" + on + ", but announcements of nodes of other pools",
+                      "set CLES_POOL to the pool that --pool of cles serve, or pool in clesd.yaml, gives them");
+    } else if (!addresses.is_secured() && heard.group_dropped != 0) {
+        found.failure("nodes", "no nodes found" + on + ", but datagrams that cannot be read",
+                      "if they are of nodes with security, give the key of a member of their fleet: --keys DIR");
+    } else if (!known.at_port.empty()) {
+        found.warning("nodes",
+                      "no nodes found" + on + ": the node at " + known.at_port + " does not announce itself there",
+                      "select its interfaces with --multicast or CLES_MULTICAST, or give it these (--multicast of cles "
+                      "serve, multicast in clesd.yaml)");
+    } else if (is_on_loopback_only(group)) {
+        found.ok("nodes", "no nodes found");
+    } else {
+        found.warning("nodes", "no nodes found" + on,
+                      "if there are some: both hosts need an interface in the same network, and UDP port " +
+                          std::to_string(group.port) + " open; cles doctor --at URL checks one without multicast");
+    }
+}
+
+// Those that do not receive this host, or cannot be read here, are only noticed by their next announcements.
+asio::awaitable<std::vector<listed_node>> wait_for_nodes(client& requester, const address_book& addresses,
+                                                         const known_before& known, findings& found) {
+    const auto limit = std::chrono::milliseconds{query_timeout};
+    auto nodes = co_await find_nodes(requester, addresses, steady::now() + announcement_time, limit);
+    if (!nodes.empty() || !addresses.finds_by_name() || known.nobody_listens) {
+        co_return nodes;
+    }
+    auto late = co_await find_nodes(requester, addresses, steady::now() + announcement_interval, limit);
+    for (const auto& node : late) {
+        found.failure("nodes", node.node + " is received, but does not receive what this host sends to the group",
+                      "open incoming UDP port " + std::to_string(addresses.group().port) +
+                          " in the firewall of its host, and outgoing in that of this one");
+    }
+    co_return late;
 }
 
 } // namespace
 
-asio::awaitable<void> check_nodes(client& requester, const address_book& addresses, findings& found) {
+asio::awaitable<void> check_nodes(client& requester, const address_book& addresses, const known_before& known,
+                                  findings& found) {
     if (!addresses.finds_by_name() && !addresses.has_url()) {
         found.ok("nodes", "no nodes are found without multicast; --at URL asks a node for those that it knows");
         co_return;
     }
     std::vector<listed_node> nodes;
     try {
-        const auto limit = std::chrono::milliseconds{query_timeout};
-        auto all = co_await find_nodes(requester, addresses, steady::now() + announcement_time, limit);
+        auto all = co_await wait_for_nodes(requester, addresses, known, found);
         nodes = std::move(all);
     } catch (const cles::error&) {
         co_return; // check_ports reports it
+    }
+    if (nodes.empty()) {
+        co_await report_none(requester, addresses, known, found);
+        co_return;
     }
     auto urls = urls_of(nodes);
     const auto answers = co_await ask_all(requester, "self:cles", std::move(urls), query_timeout);
     found.ok("nodes", count_text(nodes.size()));
     for (std::size_t i = 0; i < nodes.size(); ++i) {
-        check_node(nodes[i], answers[i], found);
+        check_node(nodes[i], answers[i], addresses.is_secured(), found);
         if (answers[i].error.empty()) {
             nodes[i].read_tasks(answers[i].json);
             check_protocol(nodes[i], answers[i].json, found);

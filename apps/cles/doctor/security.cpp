@@ -3,9 +3,12 @@
 
 #ifdef CLES_SECURITY
 
+#include <cles/security/access.hpp>
 #include <cles/security/core_dumps.hpp>
+#include <cles/security/fleet_files.hpp>
 #include <cles/security/node_files.hpp>
 
+#include <cstddef>
 #include <exception>
 #include <string>
 
@@ -39,6 +42,37 @@ void check_rules(const security::node_description& node, const std::string& dire
     }
 }
 
+// Whether another member exists, but there is none of which the node may request this.
+bool is_denied_by_all(const std::string& directory, const std::string& name, cles::verb asked) {
+    constexpr std::size_t enough = 64; // each reads the directory
+    std::size_t others = 0;
+    for (const auto& member : security::describe_fleet(directory).members) {
+        if (member.name == name || ++others > enough) {
+            continue;
+        }
+        const security::access_question question{.requester = name, .asked = asked, .noun = member.name + ":cles"};
+        if (security::explain_access(directory, question).allowed) {
+            return false;
+        }
+    }
+    return others != 0;
+}
+
+// What a member needs in order to find nodes (docs/security.md, "Rights").
+void check_rights(const std::string& name, const std::string& directory, findings& found) {
+    const bool hears = !is_denied_by_all(directory, name, cles::verb::bind);
+    const bool asks = !is_denied_by_all(directory, name, cles::verb::pull);
+    if (hears && asks) {
+        return;
+    }
+    const std::string lacking = hears ? "PULL" : asks ? "BIND" : "BIND and PULL";
+    found.failure("keys",
+                  name + " may not " + lacking + " 'cles' of any other member, so it cannot find " +
+                      (hears ? "out what they offer" : "them"),
+                  "at the fleet's authority: cles fleet rights " + name +
+                      " --may 'pull,bind *:cles' --may 'pull,push *:cles/peers', and its other rights");
+}
+
 void check_locked_memory(findings& found) {
     constexpr rlim_t needed = rlim_t{2048} * 1024; // secrets of sessions, and OpenSSL's heap for keys
     rlimit locked{};
@@ -62,6 +96,9 @@ bool check_keys(const std::string& directory, findings& found) {
         const auto node = security::describe_node(directory);
         check_membership(node, directory, found);
         check_rules(node, directory, found);
+        if (node.rights && node.rules_error.empty()) {
+            check_rights(node.name, directory, found);
+        }
         return node.rights.has_value();
     } catch (const std::exception& e) {
         found.failure("keys", e.what(), "correct it, and run cles keys show --keys " + directory);

@@ -80,10 +80,20 @@ group_receiver::result sealed_datagrams::open_group(const datagram_path& from, b
         return {};
     }
     auto found = receiver_.open(from, datagram, now());
+    if (found.what == group_receiver::verdict::dropped && !is_own(datagram)) {
+        count_unsealed();
+    }
     if (found.contact) {
         contact(*found.contact);
     }
     return found;
+}
+
+// The group returns what this node has sent.
+bool sealed_datagrams::is_own(bytes_view datagram) {
+    const auto head = read_head(datagram);
+    const auto* const self = fleet_.self();
+    return head && self != nullptr && head->sender == self->number && head->salt == sender_.salt();
 }
 
 void sealed_datagrams::on_time(time_point now) {

@@ -57,7 +57,7 @@ class sealed_datagrams final : private datagram_sink {
     void check_peer(const datagram_source& with, time_point since);
     void release(const datagram_source& which) { sessions_.release(which); }
 
-    /// A datagram that was not sealed has been dropped.
+    /// A datagram has been dropped that was not sealed, or not for the members of this fleet.
     void count_unsealed() noexcept { ++unsealed_; }
     [[nodiscard]] std::uint64_t unsealed() const noexcept { return unsealed_; }
 
@@ -86,6 +86,7 @@ class sealed_datagrams final : private datagram_sink {
     [[nodiscard]] bool holds(const datagram_source& which) const override;
 
     [[nodiscard]] datagram_socket* find(std::uint32_t number) const;
+    [[nodiscard]] bool is_own(bytes_view datagram);
     [[nodiscard]] time_point now() const { return time_->now(); }
     void report_due();
 

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "discovery/stated_endpoints.hpp"
+
+#include <cles/error.hpp>
+#include <cles/url.hpp>
+
+#include "discovery/host.hpp"
+
+#include <algorithm>
+#include <optional>
+
+namespace tool {
+namespace {
+
+// Nothing if it cannot be read, as that of a newer node.
+std::optional<cles::url> parsed(std::string_view url) {
+    try {
+        return cles::parse_url(url);
+    } catch (const cles::error&) {
+        return std::nullopt;
+    }
+}
+
+bool is_loopback(const std::string& host) { return host.starts_with("127.") || host == "::1" || host == "localhost"; }
+
+// Whether it is of use on the host of its node only.
+bool stays_there(const std::string& endpoint) {
+    const auto where = parsed(endpoint);
+    return where && (cles::stays_on_host(where->scheme) || is_loopback(where->host));
+}
+
+std::vector<std::string> with_host(const std::string& host, std::vector<std::string> stated) {
+    for (auto& endpoint : stated) {
+        if (auto where = parsed(endpoint); where && (where->host == "0.0.0.0" || where->host == "::")) {
+            where->host = host;
+            endpoint = to_string(*where);
+        }
+    }
+    return stated;
+}
+
+} // namespace
+
+bool is_elsewhere(std::string_view url) {
+    const auto where = parsed(url);
+    if (!where || cles::stays_on_host(where->scheme) || is_loopback(where->host) || where->host == "0.0.0.0") {
+        return false;
+    }
+    return std::ranges::none_of(network_interfaces(),
+                                [&](const network_interface& own) { return own.address == where->host; });
+}
+
+std::vector<std::string> endpoints_from_here(std::string_view asked, std::vector<std::string> stated) {
+    if (!is_elsewhere(asked)) {
+        return stated;
+    }
+    auto out = with_host(parsed(asked)->host, std::move(stated));
+    std::ranges::stable_partition(out, [](const std::string& endpoint) { return !stays_there(endpoint); });
+    return out;
+}
+
+std::vector<std::string> known_endpoints_from_here(std::string_view asked, std::vector<std::string> stated) {
+    if (is_elsewhere(asked)) {
+        std::erase_if(stated, stays_there);
+    }
+    return stated;
+}
+
+} // namespace tool
