@@ -128,6 +128,38 @@ class Secured(Trust):
         self.refused("bench", "--against", self.car1, says="give --keys DIR, or set CLES_KEYS")
         self.refused("bench", "--keys", "fleet/operator", says="needs --against")
 
+    @unittest.skipIf(os.geteuid() != 0, "needs another user")
+    def test_another_user_at_a_unix_socket_answers_only_if_that_is_stated(self):
+        where = f"unix://@cles-test-{os.getpid()}"
+        script = ("import os, socket, sys\n"
+                  "door = socket.socket(socket.AF_UNIX)\ndoor.bind('\\0' + sys.argv[1])\ndoor.listen()\n"
+                  "print('ready', flush=True)\n"
+                  "while True:\n"
+                  "    link, _ = door.accept()\n"
+                  "    line = link.makefile('r').readline()\n"
+                  "    if line:\n"
+                  "        id = ''.join(word[3:] for word in line.split() if word.startswith('id='))\n"
+                  "        link.sendall(f'id={id} {{\"forged\":true}}\\n'.encode() if id else b'{\"forged\":true}\\n')\n")
+        other = subprocess.Popen(["python3", "-c", script, where.partition("@")[2]], user="nobody", group="nogroup",
+                                 extra_groups=[], stdout=subprocess.PIPE, text=True, cwd="/")
+        self.addCleanup(other.communicate)
+        self.addCleanup(other.kill)
+        self.assertEqual(other.stdout.readline(), "ready\n")
+        command = ("pull", "self:echo/7", "-k", "fleet/operator", "--at", where)
+        self.failed(*command, says="listens there, who is neither root, nor the user of this process")
+        self.failed(*command, says="say which member it is: --local-user USER=MEMBER")
+        self.failed("ls", "-k", "fleet/operator", "--at", where, says="listens there")
+        by_name = ("pull", "car1:echo/7", "-k", "fleet/operator", "--peer", f"car1={where}", "--local-user")
+        self.failed(*by_name, "nobody=car2", says="listens there")
+        for accepted in ((*command, "--local-user", "nobody=car2"), (*by_name, "nobody=car1")):
+            self.assertEqual(self.good(*accepted).out, '{"forged":true}\n')
+
+    def test_the_option_local_user(self):
+        for text, says in (("nobody", "write USER=MEMBER"), ("=car1", "write USER=MEMBER"), ("nobody=a b", "write USER=MEMBER"),
+                           ("no_such_user=car1", "there is no user 'no_such_user'")):
+            self.refused("pull", "car1:echo/7", "-k", "fleet/operator", "--local-user", text, says=says)
+        self.refused("pull", "car1:echo/7", "--local-user", "nobody=car1", says="give --keys DIR, or set CLES_KEYS")
+
     # -- what is refused -------------------------------------------------------------------------------------------
 
     def test_tls_needs_a_key(self):

@@ -6,6 +6,7 @@
 #include "support/data_test_case.hpp"
 #include "support/link_pair.hpp"
 #include "support/scripted_peer.hpp"
+#include "transport/transports.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/test/unit_test.hpp>
@@ -276,6 +277,18 @@ struct socket_file {
         struct stat found {};
         return ::lstat(where.path.c_str(), &found) == 0;
     }
+    [[nodiscard]] unsigned mode() const {
+        struct stat found {};
+        BOOST_REQUIRE(::stat(where.path.c_str(), &found) == 0);
+        return found.st_mode & 07777U;
+    }
+    [[nodiscard]] std::unique_ptr<cles::acceptor> listen(cles::link_transport& by, asio::io_context& io,
+                                                         mode_t umask) const {
+        const auto before = ::umask(umask);
+        auto door = by.listen(io.get_executor(), where, {});
+        ::umask(before);
+        return door;
+    }
 };
 
 } // namespace
@@ -283,14 +296,25 @@ struct socket_file {
 BOOST_AUTO_TEST_CASE(a_socket_file_is_accessible_only_to_its_owner_and_removed_with_its_acceptor) {
     asio::io_context io;
     const socket_file file;
-    const auto mask = ::umask(0);
-    auto door = cles::find_transport("unix")->listen(io.get_executor(), file.where, {});
-    ::umask(mask);
-    struct stat made {};
-    BOOST_REQUIRE(::stat(file.where.path.c_str(), &made) == 0);
-    BOOST_TEST((made.st_mode & 07777U) == 0600U);
+    auto door = file.listen(*cles::find_transport("unix"), io, 0);
+    BOOST_TEST(file.mode() == 0600U);
     door.reset();
     BOOST_TEST(!file.exists());
+    // Those who count as the node itself need no more.
+    door = file.listen(*cles::transport::make_unix({{0, "car1"}, {::geteuid(), "car1"}}), io, 0);
+    BOOST_TEST(file.mode() == 0600U);
+}
+
+BOOST_AUTO_TEST_CASE(a_socket_file_for_other_users_is_accessible_to_them_whatever_the_umask) {
+    asio::io_context io;
+    const auto by = cles::transport::make_unix({{::geteuid() + 1, "operator"}});
+    for (const mode_t umask : {0U, 022U, 077U, 0177U}) {
+        const socket_file file;
+        const auto door = file.listen(*by, io, umask);
+        BOOST_TEST(file.mode() == 0666U);
+        door->close();
+        BOOST_TEST(!file.exists());
+    }
 }
 
 BOOST_AUTO_TEST_CASE(a_socket_file_without_a_listener_is_replaced) {

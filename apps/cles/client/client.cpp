@@ -39,7 +39,7 @@ cles::service_options options_of(const address_book& addresses, int verbosity, b
         options.pool = pool;
     }
     if (addresses.is_secured()) {
-        use_member_key(options, addresses.keys());
+        use_member_key(options, addresses.keys(), addresses.local_users());
     }
     options.peers = addresses.peers();
     if (in_group || addresses.finds_by_name()) {
@@ -58,6 +58,17 @@ bool has_code(const std::exception_ptr& thrown, cles::errc code) {
         std::rethrow_exception(thrown);
     } catch (const cles::error& e) {
         return e.code() == code;
+    } catch (...) {
+        return false;
+    }
+}
+
+// Whether the library has refused to ask at the Unix socket of another user.
+bool is_of_another_user(const std::exception_ptr& thrown) {
+    try {
+        std::rethrow_exception(thrown);
+    } catch (const cles::error& e) {
+        return std::string_view{e.code().category().name()} == "cles.unix";
     } catch (...) {
         return false;
     }
@@ -145,6 +156,9 @@ int client::run(asio::awaitable<void> work) {
     const auto code = report_failure(thrown);
     if (!hint_.empty()) {
         note(hint_);
+    }
+    if (is_of_another_user(thrown)) {
+        note("if that user runs the node, say which member it is: --local-user USER=MEMBER");
     }
     if (may_have_asked_secured_node(thrown)) {
         note("if security is on there, it answers only with --keys DIR at tls://, or at its Unix socket");

@@ -1,21 +1,34 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "client/member_key.hpp"
 
+#include "output/errors.hpp"
+
 #ifdef CLES_SECURITY
 
 #include <cles/error.hpp>
 #include <cles/security.hpp>
 #include <cles/security/core_dumps.hpp>
+#include <cles/security/local_user.hpp>
 #include <cles/security/node_files.hpp>
 
 #include <stdexcept>
+#include <utility>
 
 namespace tool {
 
-void use_member_key(cles::service_options& options, const std::string& directory) {
+void use_member_key(cles::service_options& options, const std::string& directory,
+                    const std::map<std::string, std::string>& local_users) {
     cles::security::forbid_core_dumps();
+    cles::security_options from{.directory = directory};
+    for (const auto& [user, member] : local_users) {
+        const auto id = cles::security::id_of_user(user);
+        if (!id) {
+            throw usage_error("--local-user '" + user + "=" + member + "': there is no user '" + user + "'");
+        }
+        from.local_users.emplace(*id, member);
+    }
     try {
-        options.security = cles::secured(directory);
+        options.security = cles::secured(std::move(from));
     } catch (const cles::error& e) { // of this host, not of a node
         throw std::runtime_error(e.message());
     }
@@ -31,8 +44,6 @@ std::string name_of_member(const std::string& directory) {
 
 #else
 
-#include "output/errors.hpp"
-
 namespace tool {
 namespace {
 
@@ -42,7 +53,10 @@ namespace {
 
 } // namespace
 
-void use_member_key(cles::service_options& /*options*/, const std::string& directory) { refuse(directory); }
+void use_member_key(cles::service_options& /*options*/, const std::string& directory,
+                    const std::map<std::string, std::string>& /*local_users*/) {
+    refuse(directory);
+}
 
 std::string name_of_member(const std::string& directory) { refuse(directory); }
 

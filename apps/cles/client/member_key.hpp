@@ -3,13 +3,17 @@
 
 #include <cles/service.hpp>
 
+#include <map>
 #include <string>
 
 namespace tool {
 
 /// Makes the service the member of a fleet whose key is in this directory: sets its security and its name.
+/// \param local_users which members other users of this host are, by the name or id of the user
 /// \throws std::runtime_error that says what is wrong in the directory, and what corrects it
-void use_member_key(cles::service_options& options, const std::string& directory);
+/// \throws usage_error if there is no such user
+void use_member_key(cles::service_options& options, const std::string& directory,
+                    const std::map<std::string, std::string>& local_users = {});
 
 /// Options of a service with the key in that directory, and its name; without a directory, with this name.
 /// \throws std::runtime_error as above

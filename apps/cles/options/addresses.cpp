@@ -24,6 +24,16 @@ cles::multicast_options parse_group(const std::string& text, const std::string& 
     }
 }
 
+// Of texts such as "car1=tcp://127.0.0.1:25370".
+std::map<std::string, std::string> pairs_of(const std::vector<std::string>& texts) {
+    std::map<std::string, std::string> out;
+    for (const auto& text : texts) {
+        const auto equals = text.find('=');
+        out[text.substr(0, equals)] = text.substr(equals + 1);
+    }
+    return out;
+}
+
 } // namespace
 
 void multicast_option::add_to(CLI::App& command, const std::string& help) {
@@ -73,6 +83,11 @@ void address_book::add_options(CLI::App& command, const std::string& multicast_h
     peer->type_name("NAME=URL")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     multicast_.add_to(command, multicast_help);
     keys_.add_optional_to(command, "The key directory of a member of the fleet, as which secured nodes are reached");
+    auto* user =
+        command.add_option("--local-user", local_users_,
+                           "With --keys, which member a user is, besides root and you, who listens at the Unix "
+                           "socket of --at or --peer; may be repeated");
+    user->type_name("USER=MEMBER")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 std::string address_book::at() const {
@@ -109,6 +124,15 @@ void address_book::check() const {
         }
         check_url(peer.substr(equals + 1));
     }
+    for (const auto& user : local_users_) {
+        const auto equals = user.find('=');
+        if (equals == std::string::npos || equals == 0 || !is_name(user.substr(equals + 1))) {
+            throw usage_error("--local-user '" + user + "': write USER=MEMBER, as in cles=car1");
+        }
+        if (!is_secured()) {
+            throw usage_error("--local-user '" + user + "' " + keys_needed);
+        }
+    }
 }
 
 void address_book::check_discovery() const {
@@ -118,14 +142,9 @@ void address_book::check_discovery() const {
     }
 }
 
-std::map<std::string, std::string> address_book::peers() const {
-    std::map<std::string, std::string> out;
-    for (const auto& peer : peers_) {
-        const auto equals = peer.find('=');
-        out[peer.substr(0, equals)] = peer.substr(equals + 1);
-    }
-    return out;
-}
+std::map<std::string, std::string> address_book::peers() const { return pairs_of(peers_); }
+
+std::map<std::string, std::string> address_book::local_users() const { return pairs_of(local_users_); }
 
 std::string address_book::url_for(std::string_view node) const {
     if (peers().contains(std::string{node})) {

@@ -44,6 +44,7 @@ class multicast_option {
 std::string joined(const std::vector<std::string>& names, const char* separator = ", ");
 
 /// --at, --peer and --multicast: where the command finds the nodes that it talks to. --keys: as whom it does so.
+/// --local-user: who may answer at Unix sockets then.
 class address_book {
   public:
     void add_options(CLI::App& command,
@@ -68,6 +69,8 @@ class address_book {
     /// The directory with the key of this command; empty without security.
     [[nodiscard]] std::string keys() const { return keys_.given_directory(); }
     [[nodiscard]] bool is_secured() const { return !keys().empty(); }
+    /// Which members other users of this host are: members by the names or ids of users.
+    [[nodiscard]] std::map<std::string, std::string> local_users() const;
     /// Where a node of this host listens by default.
     [[nodiscard]] std::string_view default_node() const { return is_secured() ? default_secured_url : default_url; }
     /// --multicast was given.
@@ -90,6 +93,7 @@ class address_book {
 
     std::string at_;
     std::vector<std::string> peers_;
+    std::vector<std::string> local_users_;
     multicast_option multicast_;
     keys_option keys_;
 };

@@ -22,8 +22,9 @@ struct security_options {
     /// The node's directory: its key, the roster of its fleet, and local rules. `cles keys new` and `cles fleet` make
     /// these files.
     std::string directory;
-    /// Which members other users of this host are, by user id, when they connect to a Unix socket of the node. Root and
-    /// the user of the process count as the node itself; all others are refused.
+    /// Which members other users of this host are, by user id: when they connect to a Unix socket of the node, and when
+    /// the node connects to one of theirs. Root and the user of the process count as the node itself, or as the one
+    /// that it connects to; all others are refused.
     std::map<std::uint32_t, std::string> local_users{};
 };
 

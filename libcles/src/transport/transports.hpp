@@ -33,8 +33,11 @@ std::function<void()> dial_tcp(const boost::asio::any_io_executor& executor, con
                                dial_callback done, codec_maker make_codec = nullptr);
 
 /// `unix:///path` (a socket file; one on which nothing listens any more is replaced) and `unix://@name` (abstract). The
-/// kernel reports the peer's user id; a user in `users` has that name. A file is for its owner only, unless `users` has
-/// others, besides root.
+/// kernel reports the peer's user id; a client whose user is in `users` has that name. A file is for its owner only,
+/// unless `users` has others, besides root.
+///
+/// With `users`, no link is made to a listener of another user, unless it is root or has, in `users`, the name of the
+/// node that is dialled.
 std::unique_ptr<link_transport> make_unix(user_names users = {});
 
 /// `udp://host:port`: requests, replies and updates as one datagram each.

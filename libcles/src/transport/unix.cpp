@@ -6,9 +6,13 @@
 #include <boost/asio/local/stream_protocol.hpp>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 
+#include <fcntl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -28,21 +32,67 @@ stream_address address_of(const url& where) {
     return local_protocol::endpoint{path};
 }
 
-identity identify(const std::string& address) {
-    return {.transport = "unix", .address = address, .name = {}, .uid = {}, .local = true};
-}
-
-identity identify_client(stream_socket& socket, const std::string& address, const user_names& users) {
-    auto who = identify(address);
+// The user is that of the process which has connected, or at the end that connects, of the one which listens.
+identity identify(stream_socket& socket, const std::string& address) {
+    identity who{.transport = "unix", .address = address, .name = {}, .uid = {}, .local = true};
     ucred credentials{};
     socklen_t size = sizeof credentials;
     if (::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &credentials, &size) == 0) {
         who.uid = credentials.uid;
-        if (const auto known = users.find(credentials.uid); known != users.end()) {
-            who.name = known->second;
-        }
     }
     return who;
+}
+
+identity identify_client(stream_socket& socket, const std::string& address, const user_names& users) {
+    auto who = identify(socket, address);
+    if (const auto known = who.uid ? users.find(*who.uid) : users.end(); known != users.end()) {
+        who.name = known->second;
+    }
+    return who;
+}
+
+// A listener that is not trusted. The value is the id of its user.
+class listener_errors final : public boost::system::error_category {
+  public:
+    [[nodiscard]] const char* name() const noexcept override { return "cles.unix"; }
+    [[nodiscard]] std::string message(int user) const override {
+        return "user " + std::to_string(static_cast<std::uint32_t>(user)) +
+               " listens there, who is neither root, nor the user of this process, nor stated to be that node";
+    }
+    [[nodiscard]] boost::system::error_condition default_error_condition(int /*user*/) const noexcept override {
+        return boost::system::errc::make_error_condition(boost::system::errc::permission_denied);
+    }
+};
+
+// Whoever listens could answer in the name of any node.
+error_code refusal_of(const identity& listener, std::string_view node, const user_names& users) {
+    static const listener_errors category;
+    if (!listener.uid) {
+        return boost::system::errc::make_error_code(boost::system::errc::permission_denied);
+    }
+    if (*listener.uid == 0 || *listener.uid == ::geteuid()) {
+        return {};
+    }
+    const auto stated = users.find(*listener.uid);
+    const bool is_that_node = stated != users.end() && (node.empty() || stated->second == node);
+    return is_that_node ? error_code{} : error_code{static_cast<int>(*listener.uid), category};
+}
+
+// Permits all users to connect to a socket file that has just been made; who they are is then known. Another file that
+// has been put in its place keeps its permissions.
+void permit_everybody(const std::string& path, error_code& code) {
+    constexpr mode_t everybody = S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH;
+    const int file = ::open(path.c_str(), O_PATH | O_NOFOLLOW | O_CLOEXEC);
+    struct stat made {};
+    const bool is_open = file >= 0 && ::fstat(file, &made) == 0;
+    if (is_open && (!S_ISSOCK(made.st_mode) || made.st_uid != ::geteuid() || made.st_nlink != 1)) {
+        code = boost::system::errc::make_error_code(boost::system::errc::permission_denied);
+    } else if (!is_open || ::chmod(("/proc/self/fd/" + std::to_string(file)).c_str(), everybody) != 0) {
+        code.assign(errno, boost::system::system_category());
+    }
+    if (file >= 0) {
+        close_descriptor(file);
+    }
 }
 
 // Whether it is a socket file that a dead process has left behind. Connecting alone is not enough: a regular file
@@ -100,10 +150,10 @@ class unix_transport final : public link_transport {
         const auto endpoint = address_of(where);
         auto socket = make_private<listening_socket>(executor, endpoint.protocol());
         error_code code;
-        bind(socket, endpoint, code);
+        bind(socket, where, endpoint, code);
         if (code == asio::error::address_in_use && !where.path.starts_with('@') && is_stale(where.path, endpoint)) {
             ::unlink(where.path.c_str());
-            bind(socket, endpoint, code);
+            bind(socket, where, endpoint, code);
         }
         if (code) {
             throw boost::system::system_error{code};
@@ -114,9 +164,14 @@ class unix_transport final : public link_transport {
 
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
+        return dial_node(executor, where, {}, bounds, std::move(done));
+    }
+
+    std::function<void()> dial_node(const asio::any_io_executor& executor, const url& where, std::string_view node,
+                                    const limits& bounds, dial_callback done) override {
         const auto dialler = std::make_shared<stream_dialler>(
-            executor, bounds, [address = to_string(where)](stream_socket&) { return identify(address); },
-            std::move(done));
+            executor, bounds, [address = to_string(where)](stream_socket& s) { return identify(s, address); },
+            users_.empty() ? std::move(done) : to_trusted(node, std::move(done)));
         dialler->start({address_of(where)});
         return [weak = std::weak_ptr{dialler}] {
             if (const auto alive = weak.lock()) {
@@ -126,14 +181,30 @@ class unix_transport final : public link_transport {
     }
 
   private:
-    // The file must never have wider permissions, not even for a moment: fchmod before bind sets those that it gets.
-    void bind(listening_socket& socket, const stream_address& endpoint, error_code& code) const {
-        constexpr mode_t owner = S_IRUSR | S_IWUSR;
-        constexpr mode_t everybody = owner | S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH;
+    // Passes the link on only if its listener is trusted. Nothing has been sent on it until then.
+    [[nodiscard]] dial_callback to_trusted(std::string_view node, dial_callback done) const {
+        return [users = users_, node = std::string{node}, done = std::move(done)](error_code code, link_ptr made) {
+            if (made) {
+                code = refusal_of(made->peer(), node, users);
+            }
+            if (made && code) {
+                made->close();
+                made = nullptr;
+            }
+            done(code, std::move(made));
+        };
+    }
+
+    // The file must never have wider permissions, not even for a moment: fchmod before bind sets those that it gets,
+    // without those that the umask takes away.
+    void bind(listening_socket& socket, const url& where, const stream_address& endpoint, error_code& code) const {
+        ::fchmod(socket.native_handle(), S_IRUSR | S_IWUSR);
+        socket.bind(endpoint, code);
         const bool has_others =
             std::ranges::any_of(users_, [](const auto& each) { return each.first != 0 && each.first != ::geteuid(); });
-        ::fchmod(socket.native_handle(), has_others ? everybody : owner);
-        socket.bind(endpoint, code);
+        if (!code && has_others && !where.path.starts_with('@')) {
+            permit_everybody(where.path, code);
+        }
     }
 
     user_names users_;

@@ -9,43 +9,16 @@
 #ifdef CLES_WITH_SECURITY
 #include <cles/security.hpp>
 #include <cles/security/core_dumps.hpp>
+#include <cles/security/local_user.hpp>
 #include <cles/security/node_files.hpp>
 
-#include <charconv>
-#include <cstdint>
 #include <exception>
-#include <optional>
 #include <string>
-#include <vector>
-
-#include <pwd.h>
-#include <unistd.h>
 #endif
 
 namespace cles::runtime {
 
 #ifdef CLES_WITH_SECURITY
-
-namespace {
-
-// By name, or by number.
-std::optional<std::uint32_t> id_of_user(const std::string& user) {
-    std::uint32_t number = 0;
-    const auto [end, wrong] = std::from_chars(user.data(), user.data() + user.size(), number);
-    if (wrong == std::errc{} && end == user.data() + user.size()) {
-        return number;
-    }
-    constexpr std::size_t enough = 16'384;
-    std::vector<char> space(enough);
-    passwd entry{};
-    passwd* found = nullptr;
-    if (::getpwnam_r(user.c_str(), &entry, space.data(), space.size(), &found) != 0 || found == nullptr) {
-        return {};
-    }
-    return entry.pw_uid;
-}
-
-} // namespace
 
 detail::service_part security_of(const config& setup) {
     if (!setup.security.is_on()) {
@@ -54,7 +27,7 @@ detail::service_part security_of(const config& setup) {
     security::forbid_core_dumps();
     security_options options{.directory = setup.security.keys};
     for (const auto& [user, member] : setup.security.local_users) {
-        const auto id = id_of_user(user);
+        const auto id = security::id_of_user(user);
         if (!id) {
             throw config_error(setup.location_of("security.local_users." + user), "there is no user '" + user + "'");
         }

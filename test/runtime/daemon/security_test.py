@@ -122,8 +122,7 @@ class LocalUsers(unittest.TestCase):
         with Fleet("car1", "operator") as fleet:
             os.chmod(fleet.path, 0o755)
             fleet.rule("car1", "deny operator may pull *:cles/peers\n")
-            with Node(fleet, "car1", "  local_users: {nobody: operator}\n") as car1:
-                os.chmod(car1.socket, 0o777)
+            with Node(fleet, "car1", "  local_users: {nobody: operator}\n", umask=0o022) as car1:
                 self.assertIn('"node":"car1"', car1.ask("PULL self:cles"))
                 self.assertIn('"node":"car1"', self.ask_as(nobody, car1, "PULL self:cles"))
                 self.assertIn("denied", self.ask_as(nobody, car1, "PULL self:cles/peers"))

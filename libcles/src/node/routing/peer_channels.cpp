@@ -261,7 +261,8 @@ url peer_channels::checked_url(std::string_view where) const {
 std::string_view peer_channels::name_to_check(std::string_view target, std::string_view at,
                                               std::string_view address) const {
     const bool authenticates =
-        address.starts_with("tls://") || (host_.node().security && address.starts_with("udp://"));
+        address.starts_with("tls://") ||
+        (host_.node().security && (address.starts_with("udp://") || address.starts_with("unix://")));
     return at.empty() && authenticates ? target : std::string_view{};
 }
 

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/fleet/file_protection.hpp"
 
+#include <cles/security/local_user.hpp>
+
 #include "security/keys/keys.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -104,6 +107,21 @@ std::string shell_quoted(std::string_view text) {
         }
     }
     return quoted + "'";
+}
+
+std::optional<std::uint32_t> id_of_user(const std::string& user) {
+    std::uint32_t number = 0;
+    const auto* const end = user.data() + user.size();
+    if (const auto read = std::from_chars(user.data(), end, number); read.ec == std::errc{} && read.ptr == end) {
+        return number;
+    }
+    passwd entry{};
+    passwd* found = nullptr;
+    std::array<char, entry_size> buffer{};
+    if (getpwnam_r(user.c_str(), &entry, buffer.data(), buffer.size(), &found) != 0 || found == nullptr) {
+        return {};
+    }
+    return entry.pw_uid;
 }
 
 std::string user_name(std::uint32_t user) {
