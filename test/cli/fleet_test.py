@@ -16,7 +16,7 @@ class Init(Trust):
         done = self.good("fleet", "init", "some/fleet")
         self.assertEqual(done.out, "some/fleet\n")
         self.assertIn("keep some/fleet/fleet.key off the nodes", done.err)
-        self.assertIn("cles fleet add car1.pub --keys some/fleet", done.err)
+        self.assertIn("cles fleet add car1.pub --may RIGHT --keys some/fleet", done.err)
         self.assertEqual(stat.S_IMODE(self.path("some/fleet/fleet.key").stat().st_mode), 0o600)
         self.assertEqual({name for name in os.listdir(self.path("some/fleet")) if not name.startswith(".")},
                          {"fleet.key", "roster"})
@@ -35,9 +35,12 @@ class Init(Trust):
 
     def test_invalid_names_create_nothing(self):
         for text, says in (("car1,", "--with 'car1,'"), (",", "is not a name"), ("car1,,car2", "'' is not a name"),
-                           ("car 1", "is not a name"), ("car1,car2,car1", "a name is there twice"), ("car1,self", "cannot be the name"), ("../x", "is not a name")):
+                           ("car 1", "is not a name"), ("car1,car2,car1", "a name is there twice"), ("car1,self", "cannot be the name"), ("../x", "is not a name"),
+                           ("..", "begins with '.'"), (".", "begins with '.'"), ("car1,.hidden", "begins with '.'"),
+                           ("car1,-rf", "begins with '-'"), ("roster", "name of a folder in fleet"),
+                           ("fleet.key", "name of a folder"), ("car1,car1.join", "name of a folder")):
             self.refused("fleet", "init", "fleet", "--with", text, says=says)
-        self.assertFalse(self.path("fleet").exists())
+        self.assertEqual(os.listdir(self.path("")), [])
         self.path("fleet").mkdir()
         self.path("fleet/car1").mkdir()
         self.failed("fleet", "init", "fleet", "--with", "car1", says="fleet/car1 already exists")
@@ -58,9 +61,13 @@ class Add(Trust):
         self.fleet()
         for name in ("car1", "car2"):
             self.good("keys", "new", name, "-k", name)
-        done = self.good("fleet", "add", "car1/car1.pub", "car2/car2.pub", "-k", "fleet")
+        done = self.good("fleet", "add", "car1/car1.pub", "car2/car2.pub", "--may", "all", "-k", "fleet")
         self.assertEqual(done.out, "fleet/car1.join\nfleet/car2.join\n")
         self.assertIn("version 2 of the roster is in fleet", done.err)
+        for name in ("car1", "car2"):
+            shown = self.json("keys", "show", "-k", name)["fingerprint"]
+            self.assertRegex(shown, "^([0-9a-f]{4}-){4}[0-9a-f]{4}$")
+            self.assertIn(f"{name} has the fingerprint {shown}: compare it with that of 'cles keys show' at {name}", done.err)
         self.assertIn("next: carry each NAME.join to the node NAME, and run there: cles keys join NAME.join", done.err)
         members = self.fleet_of("fleet")["members"]
         self.assertEqual([(m["number"], m["name"], m["forwards"]) for m in members], [(1, "car1", []), (2, "car2", [])])
@@ -92,43 +99,73 @@ class Add(Trust):
             self.refused("fleet", "add", "car1/car1.pub", "-k", "fleet", *options, says=says)
         self.assertEqual(self.fleet_of("fleet")["version"], 1)
 
+    def test_rights_are_not_given_by_leaving_them_out(self):
+        self.fleet()
+        self.good("keys", "new", "car1", "-k", "car1")
+        for options in ([], ["--offers", "none"], ["--forwards", "all"]):
+            for choice in ("--may RIGHT", "--may none", "--may all"):
+                self.refused("fleet", "add", "car1/car1.pub", "-k", "fleet", *options, says=choice)
+        self.assertEqual(self.fleet_of("fleet")["version"], 1)
+        self.good("fleet", "add", "car1/car1.pub", "-k", "fleet", "--may", "none")
+        (member,) = self.fleet_of("fleet")["members"]
+        self.assertEqual(member["may"], [])
+
+    def test_an_exchanged_file_has_another_fingerprint(self):
+        self.fleet()
+        for folder in ("car1", "thief"):
+            self.good("keys", "new", "car1", "-k", folder)
+        done = self.good("fleet", "add", "thief/car1.pub", "-k", "fleet", "--may", "all")
+        self.assertNotIn(self.json("keys", "show", "-k", "car1")["fingerprint"], done.err)
+        self.assertIn(self.json("keys", "show", "-k", "thief")["fingerprint"], done.err)
+
+    def test_names_that_cannot_be_those_of_files(self):
+        self.fleet()
+        self.good("keys", "new", "car1", "-k", "car1")
+        line = self.path("car1/car1.pub").read_text()
+        before = sorted(os.listdir(self.path("fleet")))
+        for name in ("..", ".hidden", "-rf"):
+            self.path("it.pub").write_text(line.replace("car1", name))
+            self.failed("fleet", "add", "it.pub", "-k", "fleet", "--may", "all", says=f"'{name}' cannot be the name of a member")
+        self.assertEqual(self.fleet_of("fleet")["version"], 1)
+        self.assertEqual(sorted(os.listdir(self.path("fleet"))), before)
+
     def test_what_is_no_public_key(self):
         self.joined("car1")
-        self.refused("fleet", "add", "-k", "fleet", says="files")
-        self.refused("fleet", "add", "nowhere.pub", "-k", "fleet", says="cannot read nowhere.pub: No such file")
-        self.failed("fleet", "add", "car1/key", "-k", "fleet", says="car1/key: ")
-        self.failed("fleet", "add", "fleet/roster", "-k", "fleet", says="fleet/roster: ")
-        self.failed("fleet", "add", "car1/car1.pub", "-k", "fleet", says="car1 is already a member")
+        self.refused("fleet", "add", "--may", "all", "-k", "fleet", says="files")
+        self.refused("fleet", "add", "nowhere.pub", "--may", "all", "-k", "fleet", says="cannot read nowhere.pub: No such file")
+        self.failed("fleet", "add", "car1/key", "--may", "all", "-k", "fleet", says="car1/key: ")
+        self.failed("fleet", "add", "fleet/roster", "--may", "all", "-k", "fleet", says="fleet/roster: ")
+        self.failed("fleet", "add", "car1/car1.pub", "--may", "all", "-k", "fleet", says="car1 is already a member")
         line = self.path("car1/car1.pub").read_text()
         self.path("car2.pub").write_text(line.replace("car1", "car2"))
-        self.failed("fleet", "add", "car2.pub", "-k", "fleet", says="is that of the member car1")
+        self.failed("fleet", "add", "car2.pub", "--may", "all", "-k", "fleet", says="is that of the member car1")
         self.path("all.pub").write_text(line.replace("car1", "all"))
-        self.failed("fleet", "add", "all.pub", "-k", "fleet", says="all.pub: ")
+        self.failed("fleet", "add", "all.pub", "--may", "all", "-k", "fleet", says="all.pub: ")
         # One wrong file, and none is added.
         self.good("keys", "new", "car3", "-k", "car3")
-        self.failed("fleet", "add", "car3/car3.pub", "car1/car1.pub", "-k", "fleet", says="already a member")
+        self.failed("fleet", "add", "car3/car3.pub", "car1/car1.pub", "--may", "all", "-k", "fleet", says="already a member")
         self.assertEqual(self.fleet_of("fleet")["version"], 2)
         self.assertFalse(self.path("fleet/car3.join").exists())
 
     def test_without_an_authority(self):
         self.joined("car1")
         self.good("keys", "new", "car2", "-k", "car2")
-        self.failed("fleet", "add", "car2/car2.pub", "-k", "car1", says="car1/fleet.key does not exist: 'cles fleet init'")
+        self.failed("fleet", "add", "car2/car2.pub", "--may", "all", "-k", "car1", says="car1/fleet.key does not exist: 'cles fleet init'")
         self.path("fleet/fleet.key").chmod(0o644)
-        self.failed("fleet", "add", "car2/car2.pub", "-k", "fleet", says="chmod 600 fleet/fleet.key")
+        self.failed("fleet", "add", "car2/car2.pub", "--may", "all", "-k", "fleet", says="chmod 600 fleet/fleet.key")
         self.path("fleet/fleet.key").chmod(0o600)
         for roster in (self.path("fleet").glob("*")):
             if roster.name != "fleet.key":
                 roster.unlink()
-        self.failed("fleet", "add", "car2/car2.pub", "-k", "fleet", says="fleet contains no roster: put the fleet's newest")
+        self.failed("fleet", "add", "car2/car2.pub", "--may", "all", "-k", "fleet", says="fleet contains no roster: put the fleet's newest")
 
     def test_at_the_same_time(self):
         self.fleet()
         names = [f"car{i}" for i in range(8)]
         for name in names:
             self.good("keys", "new", name, "-k", name)
-        started = [subprocess.Popen([CLES, "fleet", "add", f"{name}/{name}.pub", "-k", "fleet"], cwd=self.path(""),
-                                    env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        started = [subprocess.Popen([CLES, "fleet", "add", f"{name}/{name}.pub", "--may", "all", "-k", "fleet"],
+                                    cwd=self.path(""), env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
                    for name in names]
         added = []
         for name, process in zip(names, started):
@@ -173,7 +210,7 @@ class Change(Trust):
         self.failed("keys", "join", "fleet/roster", "-k", "car1", says="does not contain car1")
         self.good("keys", "join", "fleet/roster", "-k", "car2")
         # Who returns gets a new number.
-        self.good("fleet", "add", "car1/car1.pub", "-k", "fleet")
+        self.good("fleet", "add", "car1/car1.pub", "--may", "all", "-k", "fleet")
         self.assertEqual([m["number"] for m in self.fleet_of("fleet")["members"]], [2, 4])
 
     def test_rotation(self):
@@ -201,7 +238,7 @@ class Change(Trust):
             self.path("backup", name).write_bytes(content)
             self.path("backup", name).chmod(0o600)
         self.good("fleet", "rotate", "-k", "fleet")
-        self.good("fleet", "add", "car2/car2.pub", "-k", "backup")
+        self.good("fleet", "add", "car2/car2.pub", "--may", "all", "-k", "backup")
         self.path("fleet/car2.join").write_bytes(self.path("backup/car2.join").read_bytes())
         self.assertIn("has the same version, so it is ignored; the next version ends the fork",
                       self.good("fleet", "show", "-k", "fleet").err)

@@ -18,7 +18,10 @@ class New(Trust):
     def test_it_creates_a_key_that_only_the_owner_can_read(self):
         done = self.run_in("keys", "new", "car1", "--keys", "etc/cles/car1")
         self.assertEqual((done.code, done.out), (0, "etc/cles/car1/car1.pub\n"), done.err)
-        self.assertIn("next: carry etc/cles/car1/car1.pub to the fleet's authority", done.err)
+        self.assertIn("next: carry etc/cles/car1/car1.pub to the fleet's authority, and run there: cles fleet add car1.pub "
+                      "--may RIGHT", done.err)
+        shown = self.json("keys", "show", "-k", "etc/cles/car1")["fingerprint"]
+        self.assertIn(f"its fingerprint is {shown}: compare it with what 'cles fleet add' prints", done.err)
         folder = self.path("etc/cles/car1")
         self.assertEqual(sorted(os.listdir(folder)), ["car1.pub", "key"])
         self.assertEqual(stat.S_IMODE(folder.stat().st_mode), 0o700)
@@ -38,7 +41,8 @@ class New(Trust):
 
     def test_names(self):
         for name, says in (("car 1", "is not a name"), ("", "is not a name"), ("x" * 65, "is not a name"),
-                           ("../car1", "is not a name"), ("self", "cannot be the name"), ("all", "cannot be the name")):
+                           ("../car1", "is not a name"), ("self", "cannot be the name"), ("all", "cannot be the name"),
+                           ("..", "begins with '.'"), (".hidden", "begins with '.'")):
             self.refused("keys", "new", name, "-k", "car1", says=says)
         self.assertFalse(self.path("car1").exists())
 
@@ -67,17 +71,19 @@ class Show(Trust):
         self.good("keys", "new", "car1", "-k", "car1")
         key = json.loads(self.path("car1/car1.pub").read_text())["key"]
         shown = self.json("keys", "show", "-k", "car1")
-        self.assertEqual(shown, {"name": "car1", "key": key, "member": False, "reason": "there is no roster", "rules": 0})
+        fingerprint = shown["fingerprint"]
+        self.assertEqual(shown, {"name": "car1", "key": key, "fingerprint": fingerprint, "member": False,
+                                 "reason": "there is no roster", "rules": 0})
         self.assertIn("fleet     none: there is no roster\n", self.good("keys", "show", "-k", "car1", "-o", "table").out)
 
         fleet = self.fleet()
         self.good("fleet", "add", "car1/car1.pub", "-k", "fleet", "--may", "pull *:*", "--forwards", "sat*")
         self.good("keys", "join", "fleet/car1.join", "-k", "car1")
         shown = self.json("keys", "show", "-k", "car1")
-        self.assertEqual(shown, {"name": "car1", "key": key, "fleet": fleet["fleet"], "version": 2, "member": True,
-                                 "may": ["pull *:*"], "forwards": ["sat*"], "rules": 0})
+        self.assertEqual(shown, {"name": "car1", "key": key, "fingerprint": fingerprint, "fleet": fleet["fleet"],
+                                 "version": 2, "member": True, "may": ["pull *:*"], "forwards": ["sat*"], "rules": 0})
         text = self.good("keys", "show", "-k", "car1", "-o", "table").out
-        for line in ("node      car1", f"key       {key}", f"fleet     {fleet['fleet']}", "roster    version 2",
+        for line in ("node      car1", f"key       {key}", f"          fingerprint {fingerprint}", f"fleet     {fleet['fleet']}", "roster    version 2",
                      "may       'pull *:*'", "offers    everything", "forwards  'sat*'", "rules     0 rules"):
             self.assertIn(line + "\n", text)
 
@@ -108,7 +114,7 @@ class Join(Trust):
     def test_it_prints_the_fleet_and_stores_the_roster(self):
         self.good("keys", "new", "car1", "-k", "car1")
         fleet = self.fleet()
-        self.good("fleet", "add", "car1/car1.pub", "-k", "fleet")
+        self.good("fleet", "add", "car1/car1.pub", "--may", "all", "-k", "fleet")
         done = self.good("keys", "join", "fleet/car1.join", "-k", "car1")
         self.assertEqual(done.out, fleet["fleet"] + "\n")
         self.assertIn("car1 is a member of the fleet with this key, by version 2 of the roster", done.err)
@@ -117,7 +123,7 @@ class Join(Trust):
     def test_from_stdin(self):
         self.good("keys", "new", "car1", "-k", "car1")
         self.fleet()
-        self.good("fleet", "add", "-", "-k", "fleet", stdin=self.path("car1/car1.pub").read_text())
+        self.good("fleet", "add", "-", "--may", "all", "-k", "fleet", stdin=self.path("car1/car1.pub").read_text())
         self.good("keys", "join", "-", "-k", "car1", stdin=self.path("fleet/car1.join").read_text())
         self.assertTrue(self.json("keys", "show", "-k", "car1")["member"])
         self.failed("keys", "join", "-", "-k", "car1", stdin="nonsense", says="stdin: a roster is a line of the form")
@@ -134,7 +140,7 @@ class Join(Trust):
     def test_only_one_fleet(self):
         self.joined("car1")
         self.good("fleet", "init", "second")
-        self.good("fleet", "add", "car1/car1.pub", "-k", "second")
+        self.good("fleet", "add", "car1/car1.pub", "--may", "all", "-k", "second")
         self.failed("keys", "join", "second/car1.join", "-k", "car1", says="of another fleet than that in car1")
         self.assertEqual(self.json("keys", "show", "-k", "car1")["fleet"], self.fleet_of("fleet")["fleet"])
 

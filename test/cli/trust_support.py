@@ -61,6 +61,6 @@ class Trust(unittest.TestCase):
         for name in names:
             if not self.path(name).exists():
                 self.good("keys", "new", name, "-k", name)
-        self.good("fleet", "add", *(f"{name}/{name}.pub" for name in names), "-k", "fleet")
+        self.good("fleet", "add", *(f"{name}/{name}.pub" for name in names), "--may", "all", "-k", "fleet")
         for name in names:
             self.good("keys", "join", f"fleet/{name}.join", "-k", name)

@@ -47,6 +47,13 @@ BOOST_AUTO_TEST_CASE(a_public_key_is_written_and_read) {
     BOOST_TEST(read_public_identity(std::string_view{line}.substr(0, line.size() - 1)).name == "car1");
 }
 
+BOOST_AUTO_TEST_CASE(a_fingerprint_is_that_of_the_vectors_and_of_name_and_key) {
+    const public_identity car1{"car1", vector_key("car1").public_part()};
+    BOOST_TEST(fingerprint_of(car1) == text_at(vectors(), "fingerprint"));
+    BOOST_TEST(fingerprint_of({"car2", car1.key}) != fingerprint_of(car1));
+    BOOST_TEST(fingerprint_of({"car1", vector_key("car2").public_part()}) != fingerprint_of(car1));
+}
+
 BOOST_AUTO_TEST_CASE(a_fleet_key_is_written_and_read) {
     const auto line = fleet_key_line(vector_key("car1"));
     BOOST_TEST(text_of(line) == R"({"seed":")" + car1_seed + "\"}\n");

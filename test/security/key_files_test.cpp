@@ -76,6 +76,7 @@ BOOST_AUTO_TEST_CASE(an_existing_key_is_never_replaced) {
     BOOST_TEST((files.read_public_identity("car1.pub").key == files.read_key().key.public_part()));
     BOOST_TEST(contains(refusal([&] { return files.create_key("any"); }), "reserved"));
     BOOST_TEST(contains(refusal([&] { return files.create_key("../car1"); }), "not a name"));
+    BOOST_TEST(contains(refusal([&] { return files.create_key(".hidden"); }), "begins with '.'"));
 }
 
 BOOST_AUTO_TEST_CASE(the_fleets_key_is_created_and_read) {
@@ -203,8 +204,8 @@ BOOST_AUTO_TEST_CASE(a_node_that_is_not_in_the_roster_is_told_what_to_do) {
     put_key("car3");
     put_roster("roster", authority.newest());
     BOOST_TEST(node_refusal() == own.path() + ": car3's key is not in version 3 of the roster: run 'cles fleet add "
-                                              "car3.pub' where the fleet's key is, and put the new car3.join into "
-                                              "this directory");
+                                              "car3.pub --may RIGHT' where the fleet's key is, and put the new "
+                                              "car3.join into this directory");
     authority.add({"car3", key_of("other").public_part()});
     put_roster("roster", authority.newest());
     BOOST_TEST(contains(node_refusal(), "version 4 of the roster has another key for car3"));
@@ -240,7 +241,9 @@ BOOST_AUTO_TEST_CASE(a_join_file_is_written_for_the_new_node) {
     BOOST_TEST(read_file(own / "car2.join") == authority.newest().line() + "\n");
     put_key("car2");
     BOOST_TEST(files.read_node().newest->version() == authority.newest().version());
-    BOOST_CHECK_THROW(files.write_join("../car2", authority.newest()), security_error);
+    for (const auto* name : {"../car2", ".", "..", ".hidden", "-rf"}) {
+        BOOST_CHECK_THROW(files.write_join(name, authority.newest()), security_error);
+    }
 }
 
 BOOST_AUTO_TEST_CASE(the_directory_is_created_if_wanted) {

@@ -67,6 +67,7 @@ def signed_request(following: bytes) -> dict:
 vectors = {
     "keys": {name: {"seed": seed(name).hex(), "public": who.public.hex(), "x25519_public": who.dh_public.hex()}
              for name, who in (("fleet", fleet), ("car1", car1), ("car2", car2))},
+    "fingerprint": r.fingerprint("car1", car1.public),
     "group_keys": {"current": current.hex(), "next": following.hex()},
     "roster": roster.decode(),
     "handshake": {

@@ -55,6 +55,11 @@ def x25519_of(public: bytes) -> bytes:
     return sodium.crypto_sign_ed25519_pk_to_curve25519(public)
 
 
+def fingerprint(name: str, public: bytes) -> str:
+    digits = hashlib.sha256(f"cles fingerprint 1\n{name}\n".encode() + public).hexdigest()
+    return "-".join(digits[at:at + 4] for at in range(0, 20, 4))
+
+
 def verify(public: bytes, message: bytes, signature: bytes) -> None:
     try:
         sodium.crypto_sign_open(signature + message, public)

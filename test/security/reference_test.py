@@ -30,6 +30,10 @@ class Keys(unittest.TestCase):
             self.assertEqual(who.public.hex(), VECTORS["keys"][name]["public"])
             self.assertEqual(who.dh_public.hex(), VECTORS["keys"][name]["x25519_public"])
 
+    def test_the_fingerprint_is_of_name_and_key(self):
+        self.assertEqual(r.fingerprint("car1", CAR1.public), VECTORS["fingerprint"])
+        self.assertNotEqual(r.fingerprint("car2", CAR1.public), VECTORS["fingerprint"])
+
     def test_a_value_has_one_spelling(self):
         self.assertEqual(r.binary("AAE", 2), b"\x00\x01")
         for wrong in ("AAF", "AAE=", "AA+", "AAEA", "", "A", " AAE", None):

@@ -22,8 +22,8 @@ namespace security = cles::security;
 void check_membership(const security::node_description& node, const std::string& directory, findings& found) {
     if (!node.rights) {
         found.failure("keys", node.name + " is not a member of a fleet: " + node.reason,
-                      "at the fleet's authority: cles fleet add " + node.name + ".pub; then here: cles keys join " +
-                          node.name + ".join --keys " + directory);
+                      "at the fleet's authority: cles fleet add " + node.name +
+                          ".pub --may RIGHT; then here: cles keys join " + node.name + ".join --keys " + directory);
         return;
     }
     found.ok("keys", node.name + " is a member of the fleet " + node.fleet + ", by version " +

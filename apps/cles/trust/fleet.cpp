@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/security/fleet_files.hpp>
+#include <cles/security/member_names.hpp>
 #include <cles/security/node_files.hpp>
 
 #include "commands.hpp"
@@ -52,17 +53,26 @@ void note_new_roster(const std::string& directory) {
 
 // --- init ---
 
-// The names in "car1,car2".
-std::vector<std::string> names_in(const std::string& list) {
+struct new_node {
+    std::string name;
+    std::string folder;
+};
+
+// Those in "car1,car2", each in a folder of its own.
+std::vector<new_node> nodes_in(const std::string& list, const std::string& directory) {
     const auto refuse = [&](const std::string& why) { throw usage_error("--with '" + list + "': " + why); };
-    std::vector<std::string> out;
+    std::vector<new_node> out;
     std::istringstream from{list};
     for (std::string name; std::getline(from, name, ',');) {
         check_node_name(name);
-        if (std::find(out.begin(), out.end(), name) != out.end()) {
+        if (std::ranges::find(out, name, &new_node::name) != out.end()) {
             refuse("a name is there twice");
         }
-        out.push_back(name);
+        try {
+            out.push_back({name, security::member_folder(directory, name)});
+        } catch (const std::runtime_error& e) {
+            refuse(e.what());
+        }
     }
     if (!list.empty() && (out.empty() || list.ends_with(','))) {
         refuse("write names, as in car1,car2");
@@ -70,26 +80,25 @@ std::vector<std::string> names_in(const std::string& list) {
     return out;
 }
 
-// Creates a node for each name in a folder of its own.
-void create_nodes(const std::string& directory, const std::vector<std::string>& names) {
+void create_nodes(const std::string& directory, const std::vector<new_node>& nodes) {
     std::vector<std::string> lines;
-    lines.reserve(names.size());
-    for (const auto& name : names) {
-        lines.push_back(security::create_node_key(in_folder(directory, name), name).line);
+    lines.reserve(nodes.size());
+    for (const auto& node : nodes) {
+        lines.push_back(security::create_node_key(node.folder, node.name).line);
     }
     security::add_members(directory, lines, {});
     const auto roster = security::describe_fleet(directory).line;
-    for (const auto& name : names) {
-        security::join_fleet(in_folder(directory, name), roster);
-        write_output(printable(in_folder(directory, name)) + "\n");
+    for (const auto& node : nodes) {
+        security::join_fleet(node.folder, roster);
+        write_output(printable(node.folder) + "\n");
     }
 }
 
 void init(const fleet_arguments& args) {
-    const auto names = names_in(args.with);
-    for (const auto& name : names) {
-        if (std::filesystem::exists(in_folder(args.directory, name))) {
-            throw std::runtime_error(in_folder(args.directory, name) + " already exists");
+    const auto nodes = nodes_in(args.with, args.directory);
+    for (const auto& node : nodes) {
+        if (std::filesystem::exists(node.folder)) {
+            throw std::runtime_error(node.folder + " already exists");
         }
     }
     create_parents(args.directory);
@@ -97,13 +106,13 @@ void init(const fleet_arguments& args) {
     write_output(printable(args.directory) + "\n");
     note("created a fleet with the public key " + made.fleet);
     note("keep " + in_folder(args.directory, "fleet.key") + " off the nodes: it decides who is a member");
-    if (names.empty()) {
+    if (nodes.empty()) {
         note("next: create the key of a node there (cles keys new car1), carry car1.pub here, and run: cles fleet add "
-             "car1.pub --keys " +
+             "car1.pub --may RIGHT --keys " +
              args.directory);
         return;
     }
-    create_nodes(args.directory, names);
+    create_nodes(args.directory, nodes);
     note("next: let each node on this host use its folder; on another host, let the node create its own key");
 }
 
@@ -125,8 +134,17 @@ void add_init(CLI::App& fleet, context& shared) {
 
 // --- add ---
 
+// Rights are never given by leaving an option out.
+void require_may(const rights_options& rights) {
+    if (!rights.has_may()) {
+        throw usage_error("what may it request? Give --may RIGHT, which may be repeated, as in --may "
+                          "'pull,bind *:localization'; or --may none; or, for everything, --may all");
+    }
+}
+
 void add_nodes(const fleet_arguments& args) {
     args.rights.check();
+    require_may(args.rights);
     const auto directory = args.keys.directory();
     std::vector<std::string> lines;
     for (const auto& file : args.files) {
@@ -140,6 +158,13 @@ void add_nodes(const fleet_arguments& args) {
     }
     note("version " + std::to_string(security::describe_fleet(directory).version) + " of the roster is in " +
          directory);
+    // A file that was exchanged on its way is only found by this.
+    for (const auto& line : lines) {
+        const auto name = security::name_in_public_line(line);
+        note(name + " has the fingerprint " + security::fingerprint_in_public_line(line) +
+             ": compare it with that of 'cles keys show' at " + name + "; if it differs, run: cles fleet remove " +
+             name);
+    }
     note("next: carry each NAME.join to the node NAME, and run there: cles keys join NAME.join");
 }
 
@@ -152,10 +177,11 @@ void add_add(CLI::App& fleet, context& shared) {
     args->rights.add_to(*command);
     args->keys.add_to(*command, authority_help);
     command->footer(
-        "Without --may and --offers, nodes may request and offer everything; without --forwards, they forward\n"
-        "for no other node. Prints the path of the file that is carried to each node.\n\n"
+        "--may is required: a right, 'all' or 'none'. Without --offers, nodes may offer everything; without\n"
+        "--forwards, they forward for no other node. Prints the path of the file that is carried to each node, and\n"
+        "the fingerprint of its name and key, which has to be the one that 'cles keys show' prints there.\n\n"
         "Examples:\n"
-        "  cles fleet add car1.pub car2.pub\n"
+        "  cles fleet add car1.pub car2.pub --may all\n"
         "  cles fleet add sat1.pub --may 'pull,bind *:localization' --offers none --forwards 'car*'");
     run_with_keys(*command, shared, args, add_nodes);
 }
@@ -227,7 +253,7 @@ void add_fleet(CLI::App& app, context& shared) {
     fleet->footer("Examples:\n"
                   "  cles fleet init ~/fleet         # once, at the authority\n"
                   "  export CLES_KEYS=~/fleet\n"
-                  "  cles fleet add car1.pub\n"
+                  "  cles fleet add car1.pub --may all\n"
                   "  cles fleet show");
     add_init(*fleet, shared);
     add_add(*fleet, shared);

@@ -41,7 +41,9 @@ void create_key(const keys_arguments& args) {
     const auto made = security::create_node_key(directory, args.name);
     write_output(printable(made.file) + "\n");
     note("created the private key of " + args.name + ", which stays in " + directory);
-    note("next: carry " + made.file + " to the fleet's authority, and run there: cles fleet add " + args.name + ".pub");
+    note("its fingerprint is " + made.fingerprint + ": compare it with what 'cles fleet add' prints");
+    note("next: carry " + made.file + " to the fleet's authority, and run there: cles fleet add " + args.name +
+         ".pub --may RIGHT");
 }
 
 void add_new(CLI::App& keys, context& shared) {
@@ -60,7 +62,8 @@ void add_new(CLI::App& keys, context& shared) {
 // --- show ---
 
 std::string node_text(const security::node_description& node) {
-    std::string out = "node      " + printable(node.name) + "\nkey       " + node.key + "\n";
+    std::string out = "node      " + printable(node.name) + "\nkey       " + node.key + "\n          fingerprint " +
+                      node.fingerprint + "\n";
     if (node.fleet.empty()) {
         return out + "fleet     none: " + printable(node.reason) + "\n";
     }
@@ -79,6 +82,8 @@ std::string node_json(const security::node_description& node) {
     w.value(std::string_view{node.name});
     w.key("key");
     w.value(std::string_view{node.key});
+    w.key("fingerprint");
+    w.value(std::string_view{node.fingerprint});
     if (!node.fleet.empty()) {
         w.key("fleet");
         w.value(std::string_view{node.fleet});
@@ -161,9 +166,9 @@ void add_keys(CLI::App& app, context& shared) {
     auto* keys = app.add_subcommand("keys", "Create and show the key of a node, and join a fleet");
     keys->require_subcommand(1);
     keys->footer("Examples:\n"
-                 "  cles keys new car1              # on the node\n"
-                 "  cles fleet add car1.pub         # at the fleet's authority\n"
-                 "  cles keys join car1.join        # on the node");
+                 "  cles keys new car1                  # on the node\n"
+                 "  cles fleet add car1.pub --may all   # at the fleet's authority\n"
+                 "  cles keys join car1.join            # on the node");
     add_new(*keys, shared);
     add_show(*keys, shared);
     add_join(*keys, shared);

@@ -22,6 +22,7 @@ class rights_options {
     void add_to(CLI::App& command);
 
     [[nodiscard]] bool is_any_given() const noexcept { return !may_.empty() || !offers_.empty() || !forwards_.empty(); }
+    [[nodiscard]] bool has_may() const noexcept { return !may_.empty(); }
     /// \throws usage_error that says which of them is not valid, and why
     void check() const;
     /// Replaces the lists that were given.

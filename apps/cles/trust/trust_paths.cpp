@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "trust/trust_paths.hpp"
 
-#include "options/arguments.hpp"
+#include <cles/security/member_names.hpp>
 
 #include <filesystem>
 #include <system_error>
@@ -9,11 +9,8 @@
 namespace tool {
 
 void check_node_name(const std::string& name) {
-    if (!is_name(name)) {
-        throw usage_error("'" + name + "' is not a name (1 to 64 letters, digits, '_', '-', '.')");
-    }
-    if (name == "self" || name == "any" || name == "all") {
-        throw usage_error("'" + name + "' cannot be the name of a node");
+    if (const auto flaw = cles::security::flaw_of_member_name(name); !flaw.empty()) {
+        throw usage_error(flaw);
     }
 }
 

@@ -9,13 +9,13 @@
 
 namespace tool {
 
-/// \throws usage_error unless a node may have this name
+/// \throws usage_error unless a new member may have this name
 void check_node_name(const std::string& name);
 
 /// Creates the folders that contain this one.
 void create_parents(const std::string& directory);
 
-/// The path of what has this name in a folder.
+/// The path of what has this name in a folder. For names of members, see cles/security/member_names.hpp.
 std::string in_folder(const std::string& directory, const std::string& name);
 
 /// Calls `use`; names the file that was carried here in its error.

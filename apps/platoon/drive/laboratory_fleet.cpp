@@ -5,6 +5,7 @@
 
 #include <cles/security/core_dumps.hpp>
 #include <cles/security/fleet_files.hpp>
+#include <cles/security/member_names.hpp>
 #include <cles/security/node_files.hpp>
 
 #include "platoon/simulation/simulation.hpp"
@@ -42,7 +43,7 @@ void remove(const std::string& folder) {
 }
 
 void create_members(const std::string& folder, std::size_t vehicles) {
-    const auto directory_of = [&folder](const std::string& name) { return folder + "/" + name; };
+    const auto directory_of = [&folder](const std::string& name) { return security::member_folder(folder, name); };
     std::vector<std::string> names{operator_name};
     std::vector<std::string> lines;
     for (std::size_t i = 0; i < vehicles; ++i) {

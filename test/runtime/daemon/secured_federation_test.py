@@ -255,7 +255,8 @@ class SecuredFederation(unittest.TestCase):
         self.fleet.run("fleet", "remove", "hub", "--keys", self.fleet.authority)
         self.fleet.spread("gate")
         wait_until(lambda: self.metrics(gate)["pools"][0]["state"] == "lost", "it is out")
-        self.fleet.run("fleet", "add", os.path.join(self.fleet.keys("hub"), "hub.pub"), "--keys", self.fleet.authority)
+        self.fleet.run("fleet", "add", os.path.join(self.fleet.keys("hub"), "hub.pub"), "--may", "all", "--keys",
+                       self.fleet.authority)
         self.fleet.let_forward("hub")
         self.fleet.spread("hub", "gate")
         wait_until(lambda: "seconds" in self.ask(hub, "PULL north.gate:utc deadline=1000"), "requests cross again")

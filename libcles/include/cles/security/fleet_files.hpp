@@ -41,6 +41,9 @@ fleet_description create_fleet(const std::string& directory);
 
 /// The node's name in such a line as NAME.pub contains. Throws if the line or its key is not valid.
 [[nodiscard]] std::string name_in_public_line(const std::string& line);
+/// A short text by which people compare the name and the key in such a line with those at the node, as in
+/// `node_description::fingerprint`. Throws as above.
+[[nodiscard]] std::string fingerprint_in_public_line(const std::string& line);
 
 /// Adds the nodes of these lines, which are the contents of NAME.pub, and writes NAME.join for each.
 /// \return the paths of these files

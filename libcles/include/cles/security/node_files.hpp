@@ -20,13 +20,15 @@ namespace cles::security {
 
 /// A node's public part, which is carried to the authority of its fleet.
 struct created_key {
-    std::string file{}; ///< the path of NAME.pub
-    std::string line{}; ///< its content
+    std::string file{};        ///< the path of NAME.pub
+    std::string line{};        ///< its content
+    std::string fingerprint{}; ///< by which people compare name and key with what has arrived elsewhere
 };
 
 struct node_description {
     std::string name{};
     std::string key{};                     ///< the public key
+    std::string fingerprint{};             ///< of name and key, as in `created_key`
     std::string fleet{};                   ///< the fleet's public key; empty without a roster
     std::uint32_t version = 0;             ///< of the roster
     std::optional<member_rights> rights{}; ///< nothing if the node is not in the roster

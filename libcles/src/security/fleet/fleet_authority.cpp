@@ -4,6 +4,7 @@
 #include "json/json_members.hpp"
 #include "json/json_scan.hpp"
 #include "protocol/grammar.hpp"
+#include "security/fleet/member_file.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -147,7 +148,7 @@ void fleet_authority::add(std::span<const public_identity> nodes, const member_r
         throw security_error{"a fleet has at most 4096 members"};
     }
     for (const auto& node : nodes) {
-        require_node_name(node.name);
+        require_member_name(node.name); // before the roster is stored, since a file is written for it afterwards
         if (newest_->find(node.name) != nullptr) {
             throw security_error{node.name + " is already a member: remove it first if it has a new key"};
         }

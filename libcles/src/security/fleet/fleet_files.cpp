@@ -4,6 +4,7 @@
 #include "protocol/grammar.hpp"
 #include "security/fleet/fleet_authority.hpp"
 #include "security/fleet/key_directory.hpp"
+#include "security/fleet/member_file.hpp"
 
 #include <memory>
 #include <utility>
@@ -78,6 +79,8 @@ fleet_description describe_fleet(const std::string& directory) {
 
 std::string name_in_public_line(const std::string& line) { return read_public_identity(line).name; }
 
+std::string fingerprint_in_public_line(const std::string& line) { return fingerprint_of(read_public_identity(line)); }
+
 std::vector<std::string> add_members(const std::string& directory, const std::vector<std::string>& public_lines,
                                      const member_rights& rights) {
     std::vector<public_identity> nodes;
@@ -91,7 +94,7 @@ std::vector<std::string> add_members(const std::string& directory, const std::ve
     std::vector<std::string> out;
     for (const auto& node : nodes) {
         stored.files.write_join(node.name, stored.authority.newest());
-        out.push_back(stored.files.folder().path_of(node.name + ".join"));
+        out.push_back(stored.files.folder().path_of(member_file(node.name, ".join")));
     }
     return out;
 }

@@ -2,6 +2,7 @@
 #include "security/fleet/key_directory.hpp"
 
 #include "protocol/grammar.hpp"
+#include "security/fleet/member_file.hpp"
 
 #include <utility>
 
@@ -37,7 +38,7 @@ void require_listed(const node_identity& own, const roster& newest) {
         }
         return;
     }
-    const auto adding = "run 'cles fleet add " + own.name + ".pub' where the fleet's key is";
+    const auto adding = "run 'cles fleet add " + own.name + ".pub --may RIGHT' where the fleet's key is";
     if (newest.find(own.name) != nullptr) {
         throw security_error{version + " has another key for " + own.name + ": use that key, or remove " + own.name +
                              " from the fleet and " + adding};
@@ -49,7 +50,7 @@ void require_listed(const node_identity& own, const roster& newest) {
 } // namespace
 
 node_identity key_directory::create_key(const std::string& name) const {
-    require_node_name(name);
+    require_member_name(name);
     node_identity made{name, signing_key::generate()};
     // The private key comes first: while it exists, no other one is created.
     folder_.create_file(key_file, to_line(made).view(), file_access::secret);
@@ -58,8 +59,7 @@ node_identity key_directory::create_key(const std::string& name) const {
 }
 
 void key_directory::write_public_identity(const public_identity& identity) const {
-    require_node_name(identity.name);
-    folder_.replace_file(identity.name + ".pub", as_bytes(to_line(identity)), file_access::readable);
+    folder_.replace_file(member_file(identity.name, ".pub"), as_bytes(to_line(identity)), file_access::readable);
 }
 
 bool key_directory::has_key() const { return folder_.read_secret(key_file, max_key_file).has_value(); }
@@ -135,7 +135,7 @@ node_credentials key_directory::read_node() const {
     if (!newest) {
         throw security_error{folder_.path() + " contains no roster: put " + own.name +
                              ".join there, which 'cles fleet add " + own.name +
-                             ".pub' writes where the fleet's key is"};
+                             ".pub --may RIGHT' writes where the fleet's key is"};
     }
     naming(folder_.path(), [&] { require_listed(own, *newest); });
     return {std::move(own), std::move(newest), std::move(warnings)};
@@ -155,8 +155,7 @@ bool key_directory::store_roster(const roster& newest) const {
 }
 
 void key_directory::write_join(const std::string& name, const roster& newest) const {
-    require_node_name(name);
-    folder_.replace_file(name + ".join", as_bytes(file_line(newest)), file_access::readable);
+    folder_.replace_file(member_file(name, ".join"), as_bytes(file_line(newest)), file_access::readable);
 }
 
 } // namespace cles::security

@@ -4,6 +4,7 @@
 #include "security/access/local_rules.hpp"
 #include "security/fleet/group_keys.hpp"
 #include "security/fleet/key_directory.hpp"
+#include "security/fleet/member_file.hpp"
 
 namespace cles::security {
 namespace {
@@ -21,7 +22,8 @@ std::string reason_not_in(const roster& read, const node_identity& own) {
 }
 
 node_description describe(const key_directory& files, const node_identity& own) {
-    node_description out{.name = own.name, .key = to_base64url(own.key.public_part())};
+    node_description out{
+        .name = own.name, .key = to_base64url(own.key.public_part()), .fingerprint = fingerprint_of(own.public_part())};
     if (const auto newest = files.read_newest_roster(out.warnings)) {
         out.fleet = to_base64url(newest->fleet());
         out.version = newest->version();
@@ -41,13 +43,16 @@ node_description describe(const key_directory& files, const node_identity& own) 
 } // namespace
 
 created_key create_node_key(const std::string& directory, const std::string& name) {
+    require_member_name(name); // before the directory is created
     const auto files = key_directory::create(directory);
     if (files.has_key()) {
         throw security_error{files.folder().path_of("key") +
                              " already exists, and is never replaced: use another directory, or the key that is there"};
     }
-    const auto made = files.create_key(name);
-    return {files.folder().path_of(name + ".pub"), to_line(made.public_part())};
+    const auto made = files.create_key(name).public_part();
+    return {.file = files.folder().path_of(member_file(name, ".pub")),
+            .line = to_line(made),
+            .fingerprint = fingerprint_of(made)};
 }
 
 node_description describe_node(const std::string& directory) {

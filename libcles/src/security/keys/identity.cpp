@@ -4,6 +4,8 @@
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <initializer_list>
 #include <optional>
 
@@ -70,14 +72,41 @@ secret_bytes line_with_seed(std::initializer_list<std::string_view> parts, const
 
 } // namespace
 
+std::string flaw_of_node_name(std::string_view text) {
+    if (!protocol::is_name(text)) {
+        return protocol::quoted(text) + " is not a name of a node (1 to 64 letters, digits, '_', '-', '.')";
+    }
+    if (protocol::is_reserved_target(text)) {
+        return protocol::quoted(text) + " is reserved and cannot be the name of a node";
+    }
+    return {};
+}
+
 void require_node_name(std::string_view name) {
-    if (!protocol::is_name(name)) {
-        throw security_error{protocol::quoted(name) +
-                             " is not a name of a node (1 to 64 letters, digits, '_', '-', '.')"};
+    if (const auto flaw = flaw_of_node_name(name); !flaw.empty()) {
+        throw security_error{flaw};
     }
-    if (protocol::is_reserved_target(name)) {
-        throw security_error{protocol::quoted(name) + " is reserved and cannot be the name of a node"};
+}
+
+std::string fingerprint_of(const public_identity& identity) {
+    prepare_sodium();
+    auto text = "cles fingerprint 1\n" + identity.name + "\n";
+    text.append(as_text(identity.key));
+    std::array<std::uint8_t, crypto_hash_sha256_BYTES> digest{};
+    crypto_hash_sha256(digest.data(), as_bytes(text).data(), text.size());
+    constexpr std::size_t shown = 10; // bytes
+    constexpr std::size_t group = 2;
+    constexpr std::string_view digits = "0123456789abcdef";
+    std::string out;
+    for (std::size_t i = 0; i < shown; ++i) {
+        if (i != 0 && i % group == 0) {
+            out.push_back('-');
+        }
+        const std::size_t byte = digest[i];
+        out.push_back(digits[byte / 16]);
+        out.push_back(digits[byte % 16]);
     }
+    return out;
 }
 
 std::string to_line(const public_identity& identity) {

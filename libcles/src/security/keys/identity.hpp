@@ -25,8 +25,13 @@ struct node_identity {
     [[nodiscard]] public_identity public_part() const { return {name, key.public_part()}; }
 };
 
-/// \throws security_error if the text is not a name, or is reserved
+/// What keeps a text from being the name of a node; empty if nothing does.
+std::string flaw_of_node_name(std::string_view text);
+/// \throws security_error if there is such a flaw
 void require_node_name(std::string_view name);
+
+/// A short text by which people compare a name and its key: five groups of four hexadecimal digits.
+std::string fingerprint_of(const public_identity& identity);
 
 std::string to_line(const public_identity& identity);
 secret_bytes to_line(const node_identity& identity);
