@@ -117,7 +117,7 @@ class Secured(Trust):
     def test_the_log_names_the_address_and_the_key_of_a_stranger(self):
         self.good("fleet", "init", "other", "--with", "stranger")
         key = json.loads(self.good("keys", "show", "-k", "other/stranger", "-o", "json").out)["key"]
-        self.failed("pull", "self:cles", "-k", "other/stranger", "--at", self.car1, says="refuses this node")
+        self.failed("pull", "self:cles", "-k", "other/stranger", "--at", self.car1, says="not in the roster")
         self.assertIn(f"(127.0.0.1, key {key})", self.logged("car1", "not in roster"))
 
     @unittest.skipIf(not os.path.exists(CLES + "-bench"), "cles-bench is not built")
