@@ -129,9 +129,11 @@ std::string as_seen_from_here(const std::string& answer, const std::string& aske
 asio::awaitable<void> show(client& requester, const info_arguments& args) {
     const auto options = requester.options_for(args.noun, args.timeout);
     const cles::json_text answer = co_await requester.node().async_pull(args.noun, options);
-    const auto seen = args.format == output_format::raw
+    const auto target = target_of(args.noun);
+    const bool is_direct = target == "self" || !args.addresses.has_url(); // else another node has asked it
+    const auto seen = args.format == output_format::raw || !is_direct
                           ? answer.text
-                          : as_seen_from_here(answer.text, requester.endpoint_of(target_of(args.noun)));
+                          : as_seen_from_here(answer.text, requester.endpoint_of(target));
     if (resolved(args.format) == output_format::table) {
         const auto node = cles::from_json<node_document>(seen);
         write_output(details_of(node) + (node.tasks.empty() ? "" : "\n" + tasks_of(node)));

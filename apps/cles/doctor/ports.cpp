@@ -60,6 +60,7 @@ asio::awaitable<listener_or_error> identify(client& requester, cles::call_option
         out.denied = e.code() == cles::errc::denied;
         out.refused = e.code() == boost::system::errc::permission_denied &&
                       e.code().category() != cles::error_category() &&
+                      std::string_view{e.code().category().name()} != "cles.unix" && // this program's own refusal
                       e.code().category() != boost::system::system_category();
         out.error = e.message().empty() ? e.code().message() : e.message();
     }
