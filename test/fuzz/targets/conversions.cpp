@@ -247,13 +247,17 @@ struct maker<boost::json::value> {
     }
 };
 
-/// Whether what is written is read back as the same value: not if seconds are a fraction of the value's unit.
+/// Whether what is written is read back as the same text: not if seconds are a fraction of the value's unit, or members
+/// are in no order.
 template <class T>
 inline constexpr bool is_exact = true;
 template <std::floating_point Rep, class Period>
 inline constexpr bool is_exact<std::chrono::duration<Rep, Period>> = std::ratio_equal_v<Period, std::ratio<1>>;
 template <std::floating_point Rep, class Period>
 inline constexpr bool is_exact<std::chrono::sys_time<std::chrono::duration<Rep, Period>>> = false;
+
+template <class Value>
+inline constexpr bool is_exact<std::unordered_map<std::string, Value>> = false;
 
 // -- the properties ------------------------------------------------------------------------------------------------
 
@@ -287,6 +291,11 @@ void check_written(const T& value) {
     require(from_json(*text, again, &why), "what is written can be read", *text + ": " + why);
     require(!is_exact<T> || written(again) == text, "it is written the same", *text);
 
+    // These are sent as they are; the other end refuses scalars.
+    constexpr bool is_any_json = std::is_same_v<T, json_text> || std::is_same_v<T, boost::json::value>;
+    if (is_any_json && text->front() != '{' && text->front() != '[') {
+        return;
+    }
     using carrier = std::conditional_t<detail::comes_wrapped<T>, detail::wrapped<T>, T>;
     const auto body = detail::to_body(value);
     require(body.starts_with('{') || body.starts_with('['), "a body is an object or an array", body);
