@@ -60,8 +60,9 @@ void bind_requests::drop(const leased& which) {
 std::vector<bind_requests::leased> bind_requests::forbidden() const {
     std::vector<leased> found;
     for (const auto& [path, all] : requesters_) {
-        const auto is_forbidden = [&](const owned_origin& by) {
-            return !permits(node_, by, node_.name, verb::bind, path);
+        // clang 14 captures no structured binding by itself.
+        const auto is_forbidden = [&, &bound = path](const owned_origin& by) {
+            return !permits(node_, by, node_.name, verb::bind, bound);
         };
         if (std::ranges::any_of(all, is_forbidden)) {
             found.push_back({{}, {path}});
