@@ -178,7 +178,7 @@ double require_finite(double number, bool was_finite, std::string_view why);
 /// As `std::isfinite`, whose header would slow down every user's compilation.
 template <std::floating_point T>
 constexpr bool is_finite(T value) noexcept {
-    return value - value == 0;
+    return value >= std::numeric_limits<T>::lowest() && value <= std::numeric_limits<T>::max();
 }
 
 /// \throws cles::error with `conversion` if the text is not JSON, or nested too deep
