@@ -23,7 +23,9 @@ void use_member_key(cles::service_options& options, const std::string& directory
     for (const auto& [user, member] : local_users) {
         const auto id = cles::security::id_of_user(user);
         if (!id) {
-            throw usage_error("--local-user '" + user + "=" + member + "': there is no user '" + user + "'");
+            std::string why = "--local-user '";
+            why.append(user).append("=").append(member).append("': there is no user '").append(user).append("'");
+            throw usage_error(why);
         }
         from.local_users.emplace(*id, member);
     }

@@ -55,7 +55,7 @@ std::vector<std::string> endpoints_from_here(std::string_view asked, std::vector
         return stated;
     }
     auto out = with_host(parsed(asked)->host, std::move(stated));
-    std::ranges::stable_partition(out, [](const std::string& endpoint) { return !stays_there(endpoint); });
+    std::stable_partition(out.begin(), out.end(), [](const std::string& endpoint) { return !stays_there(endpoint); });
     return out;
 }
 

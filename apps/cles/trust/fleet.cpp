@@ -161,9 +161,10 @@ void add_nodes(const fleet_arguments& args) {
     // A file that was exchanged on its way is only found by this.
     for (const auto& line : lines) {
         const auto name = security::name_in_public_line(line);
-        note(name + " has the fingerprint " + security::fingerprint_in_public_line(line) +
-             ": compare it with that of 'cles keys show' at " + name + "; if it differs, run: cles fleet remove " +
-             name);
+        auto text = name;
+        text.append(" has the fingerprint ").append(security::fingerprint_in_public_line(line));
+        text.append(": compare it with that of 'cles keys show' at ").append(name);
+        note(text.append("; if it differs, run: cles fleet remove ").append(name));
     }
     note("next: carry each NAME.join to the node NAME, and run there: cles keys join NAME.join");
 }
