@@ -80,18 +80,24 @@ bool may_forward_for(const node_state& n, std::string_view requester) {
     return !n.security || requester == n.name || n.security->may_forward(n.name, requester);
 }
 
-passage may_pass_on(const node_state& n, const request_origin& by, std::string_view node, verb how,
-                    const protocol::noun_view& noun) {
-    return !permits(n, by, node, how, noun)    ? passage::not_permitted
+namespace {
+
+passage passage_of(const node_state& n, const request_origin& by, bool is_permitted_there) {
+    return !is_permitted_there                 ? passage::not_permitted
            : !may_forward_for(n, by.requester) ? passage::not_forwarded
                                                : passage::permitted;
 }
 
+} // namespace
+
+passage may_pass_on(const node_state& n, const request_origin& by, std::string_view node, verb how,
+                    const protocol::noun_view& noun) {
+    return passage_of(n, by, permits(n, by, node, how, noun));
+}
+
 passage may_pass_on(const node_state& n, const request_origin& by, std::string_view node, verb how,
                     std::string_view path) {
-    return !permits(n, by, node, how, path)    ? passage::not_permitted
-           : !may_forward_for(n, by.requester) ? passage::not_forwarded
-                                               : passage::permitted;
+    return passage_of(n, by, permits(n, by, node, how, path));
 }
 
 std::string how_to_permit_forwarding(std::string_view forwarder, std::string_view requester) {
