@@ -235,7 +235,8 @@ bool multicast_group::take(const group_datagram& datagram, time_point now) {
         ++counts.group_repeated;
     } else {
         ++counts.updates_dropped;
-        if (std::string why; !update.body.empty() && !is_valid_json(update.body, detail::answer_depth, &why)) {
+        if (std::string why;
+            node_->log && !update.body.empty() && !is_valid_json(update.body, detail::answer_depth, &why)) {
             node_->log_drop(host_text(from), "an update", "its body is no JSON: " + why, true);
         }
     }
