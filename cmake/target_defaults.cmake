@@ -31,6 +31,18 @@ function(cles_target_defaults target)
     target_compile_definitions(${target} PRIVATE $<$<CONFIG:Debug>:_GLIBCXX_ASSERTIONS>)
 endfunction()
 
+# cles_target_position_independent(target): for archives, so that shared libraries (of ROS, of Qt, of Python) can contain
+# them, unless the project sets CMAKE_POSITION_INDEPENDENT_CODE. Without interposition, functions of a unit are inlined as in
+# programs; the linker makes the calls of programs direct.
+function(cles_target_position_independent target)
+    if(NOT DEFINED CMAKE_POSITION_INDEPENDENT_CODE)
+        set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+    endif()
+    if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
+        target_compile_options(${target} PRIVATE -fno-semantic-interposition)
+    endif()
+endfunction()
+
 # cles_target_runs_little(target): for programs that compute little themselves (the simulation mostly runs the library), so
 # that compiling them faster gains more.
 function(cles_target_runs_little target)

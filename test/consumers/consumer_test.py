@@ -4,8 +4,9 @@
 
     consumer_test.py WAY --cmake CMAKE --compiler CXX --source ROOT --build BUILD --scratch FOLDER --version VERSION
 
-WAY: install, find_package, find_security, pkg_config or add_subdirectory. FOLDER is emptied first. Beside it are those of
-the other ways: `install` leaves the library installed for all but the last, `find_package` its objects for `pkg_config`.
+WAY: install, find_package, find_security, find_shared, pkg_config, settings, add_subdirectory or clang. FOLDER is emptied
+first. Beside it are those of the other ways: `install` leaves the library installed for all but the last two, `find_package`
+its objects for `pkg_config`.
 """
 
 import argparse
@@ -22,6 +23,14 @@ from foreign_project import ForeignProject, expect
 
 HERE = Path(__file__).resolve().parent
 LINK = re.compile(r"\]\(([^)\s#]+)(?:#[^)\s]*)?\)")
+# Settings of a program with which it does not link, and what the linker says.
+DIFFERENT = {
+    "-fno-rtti": "no_rtti",
+    "-D_GLIBCXX_DEBUG": "glibcxx_debug",
+    "-D_GLIBCXX_USE_CXX11_ABI=0": "no_glibcxx_use_cxx11_abi",
+    "-DBOOST_ASIO_ENABLE_HANDLER_TRACKING": "asio_enable_handler_tracking",
+    "-DBOOST_ASIO_DISABLE_THREADS": "asio_disable_threads",
+}
 # What the library adds in some kinds of build and on some machines, and what only our own code is held to.
 OURS = ("-Os", "-D_GLIBCXX_ASSERTIONS", "-Werror", "--param=ggc-min-heapsize=1000000")
 
@@ -31,13 +40,13 @@ class Consumer(ForeignProject):
     def installed(self) -> Path:
         return self.scratch.parent / "install" / "prefix"
 
-    def configure(self, folder: str, *settings: str) -> Path:
+    def configure(self, folder: str, *settings: str, compiler: str = "") -> Path:
         build = self.scratch / "build"
         launcher = shutil.which("ccache")
         if launcher:
             settings += (f"-DCMAKE_CXX_COMPILER_LAUNCHER={launcher}",)
         self.run(self.options.cmake, "-G", "Ninja", "-S", HERE / folder, "-B", build,
-                 f"-DCMAKE_CXX_COMPILER={self.options.compiler}", *settings)
+                 f"-DCMAKE_CXX_COMPILER={compiler or self.options.compiler}", *settings)
         return build
 
     def objects(self, build: Path) -> dict[str, Compilation]:
@@ -104,7 +113,8 @@ def check_daemon(consumer: Consumer, clesd: Path) -> None:
 
 def check_case_studies(consumer: Consumer, prefix: Path) -> None:
     """The programs and plugins of the case studies are only installed as a component."""
-    wanted = {"cles-dsgd", "cles-jadc2", "cles-platoon", "libcles-fmv.so", "libcles-sgd.so", "libcles-strike.so"}
+    wanted = {"cles-dsgd", "cles-jadc2", "cles-platoon", "libcles-digits.so", "libcles-fmv.so", "libcles-sgd.so",
+              "libcles-strike.so"}
     by_default = wanted & {file.name for file in prefix.rglob("*")}
     expect(not by_default, f"installed without being asked for: {by_default}")
 
@@ -143,8 +153,8 @@ def install(consumer: Consumer) -> None:
     expect((pages / "docs" / "protocol.md").is_file(), "the protocol's page is missing")
     expect(check_links(pages) > 20, "the installed pages should link to each other")
 
-    # Nothing contains a path of this machine, or what only tests need.
-    for file in (f for f in prefix.rglob("*") if f.is_file()):
+    # Nothing contains a path of this machine, but for the unit of systemd, or what only tests need.
+    for file in (f for f in prefix.rglob("*") if f.is_file() and f.suffix != ".service"):
         data = file.read_bytes()
         for place in (source, consumer.options.build, consumer.scratch):
             # '/tmp/w' is not named by '/tmp/wrong.yaml'.
@@ -177,6 +187,14 @@ def find_security(consumer: Consumer) -> None:
         expect(printed == "27.500000\n", f"it printed {printed!r}")
 
 
+def find_shared(consumer: Consumer) -> None:
+    """A shared library that contains the library, in a program that contains it too."""
+    build = consumer.configure("find_shared", f"-DCMAKE_PREFIX_PATH={consumer.installed}")
+    consumer.run(consumer.options.cmake, "--build", build)
+    printed = consumer.run(build / "my_program", build / "libmy_library.so")
+    expect(printed == "its denied is denied, ours is too, its service says 27.5\n", f"it printed {printed!r}")
+
+
 def pkg_config(consumer: Consumer) -> None:
     (version,) = consumer.pkg_config("cles", "--modversion")
     expect(version == consumer.options.version, f"pkg-config says version {version}")
@@ -191,6 +209,23 @@ def pkg_config(consumer: Consumer) -> None:
         program = consumer.scratch / name
         consumer.run(consumer.options.compiler, build / made, "-o", program, *consumer.pkg_config("cles", "--libs"))
         consumer.check(program)
+
+
+def settings(consumer: Consumer) -> None:
+    """Programs with other settings than the library do not link, and the linker says why."""
+    source = consumer.scratch / "program.cpp"
+    source.write_text("#include <cles/error.hpp>\nint main() { return cles::error_category().name()[0] == 'c' ? 0 : 1; }\n")
+    program = consumer.scratch / "program"
+    made = (consumer.options.compiler, "-std=c++20", source, "-o", program, *consumer.pkg_config("cles", "--cflags", "--libs"))
+    consumer.run(*made)
+    consumer.run(program)
+    for setting, told in DIFFERENT.items():
+        # Sections that are not used are discarded, but not the references of the settings.
+        printed = consumer.run(*made, setting, "-ffunction-sections", "-fdata-sections", "-Wl,--gc-sections", fails=True)
+        lines = [line for line in printed.splitlines() if f"differs_from_the_library::{told}'" in line]
+        expect(len(lines) == 1, f"with {setting}, it printed:\n{printed}")
+    printed = consumer.run(*made, "-fno-exceptions", fails=True)
+    expect("CLES needs exceptions" in printed, f"with -fno-exceptions, it printed:\n{printed}")
 
 
 def check_library_is_ours(consumer: Consumer, build: Path) -> None:
@@ -240,7 +275,21 @@ def add_subdirectory(consumer: Consumer) -> None:
     expect(not (consumer.scratch / "prefix").exists(), "the library is part of another project's installation")
 
 
-WAYS = {way.__name__: way for way in (install, find_package, find_security, pkg_config, add_subdirectory)}
+def clang(consumer: Consumer) -> None:
+    """The library and its users, compiled by clang."""
+    compiler = next(filter(None, map(shutil.which, ("clang++-14", "clang++"))), None)
+    if compiler is None:
+        print("skipped: clang++ is missing; scripts/setup --dev installs it")
+        sys.exit(77)
+    build = consumer.configure("clang", f"-DCLES_SOURCE_DIR={consumer.options.source}", compiler=compiler)
+    consumer.run(consumer.options.cmake, "--build", build, "--target", "my_program", "my_asio_program")
+    consumer.check(build / "my_program")
+    printed = consumer.run(build / "my_asio_program")
+    expect(printed == "2 asked, 27.5\n", f"it printed {printed!r}")
+
+
+WAYS = {way.__name__: way
+        for way in (install, find_package, find_security, find_shared, pkg_config, settings, add_subdirectory, clang)}
 
 
 def main() -> int:

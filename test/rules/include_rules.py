@@ -151,6 +151,10 @@ INHERITED_LAYERS = LIBRARY | {"runtime", "apps", "plugins"}
 INHERITED_OF_ASIO = re.compile(r"\basync_accept\b|\bacceptor_?\.accept\(|\.open\([^;]*(protocol\(\)|::v[46]\(\))"
                                r"|(?<!make_private<udp::socket>)[({]\w+, *(\w+::)*(udp|tcp)::v[46]\(\)")
 
+# A category of errors: without an id, the one of a shared library differs from that of the program.
+CATEGORY = re.compile(r"\bclass \w+[^;{}]*:\s*public (?:boost::system::)?error_category\s*\{(?P<body>.*?)^\};", re.MULTILINE | re.DOTALL)
+CATEGORY_ID = re.compile(r":\s*error_category\(0x")
+
 # In public headers, templates of functions are called by their qualified names: otherwise a function of that name in the
 # namespace of the user's type may be called instead. For the same reason, nothing is taken apart by structured bindings.
 FUNCTION_TEMPLATE = re.compile(r"^template <[^\n]*\n(?:[ \t}>][^\n]*\n|template <[^\n]*\n)*"
@@ -359,6 +363,11 @@ class Tree:
             for match in INHERITED_OF_ASIO.finditer(clean):
                 self.complain(name, clean.count("\n", 0, match.start()) + 1,
                               f"'{match.group(0)}': programs that are started inherit it: use transport/private_socket.hpp")
+        if layer in LIBRARY:
+            for match in CATEGORY.finditer(clean):
+                if not CATEGORY_ID.search(match["body"]):
+                    self.complain(name, clean.count("\n", 0, match.start()) + 1,
+                                  "a category of errors without an id: pass a random 64-bit number to its base")
         if layer == "public":
             for match in self.unqualified_call.finditer(clean) if self.unqualified_call else ():
                 self.complain(name, clean.count("\n", 0, match.start(1)) + 1,
@@ -407,6 +416,8 @@ GOOD = {
     "libcles/src/api/connection.cpp": '#include "node/session.hpp"\n#include <cles/registrar.hpp>\n',
     "libcles/src/asio/dial.cpp": '#include "node/session.hpp"\n#include "transport/tcp.hpp"\n#include <boost/asio/post.hpp>\n',
     "libcles/src/node/session.hpp": "#pragma once\n",
+    "libcles/src/protocol/error.cpp": "class ours final : public boost::system::error_category {\n  public:\n"
+    "    constexpr ours() noexcept : error_category(0x1234U) {}\n};\n",
     "libcles/src/node/secured/signer.hpp": "#pragma once\n",
     "libcles/src/node/secured/signer.cpp": '#include "node/secured/signer.hpp"\n',
     "libcles/src/transport/tcp.hpp": "#pragma once\n",
@@ -468,6 +479,8 @@ PLANTED = [
     ("libcles/src/transport/a.cpp", "void f() { socket.open(where.protocol(), code); }\n", "use transport/private_socket.hpp"),
     ("libcles/src/transport/a.cpp", "a::a() : socket_(executor, udp::v4()) {}\n", "use transport/private_socket.hpp"),
     ("libcles/src/transport/a.cpp", "void f() { acceptor_.async_accept(g); }\n", "use transport/private_socket.hpp"),
+    ("libcles/src/protocol/a.cpp", "class ours final : public boost::system::error_category {\n  public:\n    int f();\n};\n",
+     "without an id"),
     ("runtime/a.cpp", "int f() { return ::socket(1, 2, 0); }\n", "close-on-exec is missing"),
     ("apps/a.cpp", "int f() { return ::dup(0); }\n", "programs that are started inherit it"),
     ("apps/a.cpp", '#include "../libcles/src/node/session.hpp"\n', "apps must not include node"),

@@ -260,7 +260,8 @@ struct bind_coroutine {
 /// has another associated executor, such as a coroutine of another context, may be started and cancelled on that
 /// executor: they are dispatched to the service's executor, and their handlers are called on their own.
 ///
-/// Lifetime. Operations and feeds may outlive the service: when it is destroyed, they fail with `stopped`.
+/// Lifetime. Operations and feeds may outlive the service: when it is destroyed, they fail with `stopped`. A child
+/// process that ends after `fork` leaves the service of its parent as it is (docs/library.md).
 ///
 /// Thread pools. For a `thread_pool`, the service makes a strand itself. Then operations may be started on any thread.
 /// The other functions may be called on any thread too: they run on the strand and block until done (on the pool's own
@@ -328,6 +329,7 @@ class service : public registrar {
     }
     /// Ends all listeners, links and feeds. Operations fail with `stopped`, and running handlers are notified to stop.
     /// Replies and updates that are already queued are sent first, as far as the peer accepts them at once. Idempotent.
+    /// In a child process it does nothing, unless the child has called `notify_fork` of the context.
     void stop();
 
     void add(registration task) override;

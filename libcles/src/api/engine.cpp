@@ -21,6 +21,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace cles::detail {
 namespace {
@@ -62,7 +63,12 @@ class service_call final : public call_control, public std::enable_shared_from_t
         if (asked_) {
             call_->forget_on_stop(); // it refers to this object
         }
-        if (!call_->ended()) {
+        if (call_->ended()) {
+            return;
+        }
+        if (const auto by = std::static_pointer_cast<engine>(service_.lock()); by && by->belongs_to_parent()) {
+            engine::keep(std::move(call_));
+        } else {
             fail(errc::failed, "the handler ended without an answer");
         }
     }
@@ -363,11 +369,21 @@ std::uint64_t engine::close(std::chrono::milliseconds limit, pending_ptr operati
 }
 
 void engine::stop() {
+    if (belongs_to_parent()) {
+        return;
+    }
     if (posted_updates_) {
         posted_updates_->drain();
         posted_updates_->close();
     }
     local_node::stop();
+}
+
+void engine::keep(std::shared_ptr<const void> part) {
+    static auto& kept = *new std::vector<std::shared_ptr<const void>>;
+    static std::mutex mutex;
+    const std::scoped_lock lock{mutex};
+    kept.push_back(std::move(part));
 }
 
 } // namespace cles::detail

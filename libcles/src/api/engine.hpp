@@ -29,7 +29,13 @@ class engine final : public core::local_node {
     /// Receives updates from other threads.
     std::shared_ptr<update_sink> cross_thread_updates();
     std::uint64_t close(std::chrono::milliseconds limit, pending_ptr operation);
+    /// Does nothing in a child process, whose parent goes on with the service.
     void stop() override;
+    /// Whether this is a child process, whose parent goes on with the service. Then nothing of it may end: that would
+    /// send lines on the parent's links, set its timer, or remove the files of its sockets.
+    [[nodiscard]] bool belongs_to_parent() const noexcept { return !asio_.process().is_this(); }
+    /// Keeps a part of a service that belongs to the parent for as long as this process lives.
+    static void keep(std::shared_ptr<const void> part);
 
   private:
     engine(std::shared_ptr<asio_port::asio_environment> by, service_options options);

@@ -65,10 +65,20 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
             close();
         }
     }
+    void close() final {
+        if (host_->belongs_to_parent()) {
+            engine::keep(shared_from_this());
+            return;
+        }
+        unbind();
+        // It may be closed from inside its own event: functions up the stack still need it.
+        asio::post(executor(), [self = shared_from_this()] {});
+    }
     [[nodiscard]] const asio::any_io_executor& executor() const final { return host_->executor(); }
 
   protected:
     [[nodiscard]] engine& host() const noexcept { return *host_; }
+    virtual void unbind() = 0;
     [[nodiscard]] virtual bool is_starting() const = 0;
     /// One call of `async_next`: completes with the next event or an error, never inside this call.
     void fetch(core::feed_mailbox& from, event_ptr operation) {
@@ -79,10 +89,6 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
         } else if (from.next(std::move(operation))) {
             pump_soon(from);
         }
-    }
-    /// It may be closed from inside its own event: functions up the stack still need it.
-    void keep_for_a_turn() {
-        asio::post(executor(), [self = shared_from_this()] {});
     }
 
   private:
@@ -118,12 +124,9 @@ class link_feed final : public feed_handle {
     }
     void next(event_ptr operation) override { fetch(machine_.mail(), std::move(operation)); }
     void cancel(const pending_event* operation) override { machine_.mail().cancel(operation); }
-    void close() override {
-        machine_.close(errc::cancelled);
-        keep_for_a_turn();
-    }
 
   private:
+    void unbind() override { machine_.close(errc::cancelled); }
     [[nodiscard]] bool is_starting() const override { return machine_.is_starting(); }
 
     core::feed_machine machine_;
@@ -157,16 +160,15 @@ class group_feed_handle final : public feed_handle {
     }
     void next(event_ptr operation) override { fetch(feed_.mail(), std::move(operation)); }
     void cancel(const pending_event* operation) override { feed_.mail().cancel(operation); }
-    void close() override {
+
+  private:
+    void unbind() override {
         leave();
         if (auto waiting = feed_.mail().close()) {
             host().completions().put(core::completion{
                 core::completion::event_failure{std::move(waiting), errc::cancelled, "the feed was closed"}});
         }
-        keep_for_a_turn();
     }
-
-  private:
     [[nodiscard]] bool is_starting() const override { return starting_; }
     void leave() {
         if (auto* group = std::exchange(left_, true) ? nullptr : host().group()) {

@@ -74,7 +74,7 @@ const strand* strand_of(bool pooled, const asio::any_io_executor& executor) noex
 namespace detail {
 
 const call_options& no_options() noexcept {
-    static const call_options none{};
+    static const auto& none = *new call_options; // NOLINT(bugprone-unhandled-exception-at-new): ends it
     return none;
 }
 
@@ -143,7 +143,12 @@ service::service(asio::any_io_executor executor, const service_options& options)
 service::service(asio::io_context& context, const service_options& options)
     : service(asio::any_io_executor{context.get_executor()}, options) {}
 
-service::~service() { engine_->stop(); }
+service::~service() {
+    engine_->stop();
+    if (engine_->belongs_to_parent()) {
+        detail::engine::keep(std::move(engine_));
+    }
+}
 
 const std::string& service::name() const noexcept { return engine_->node().name; }
 

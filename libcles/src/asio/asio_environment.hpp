@@ -3,6 +3,7 @@
 
 #include <cles/link.hpp>
 
+#include "asio/owning_process.hpp"
 #include "port/environment.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
@@ -46,9 +47,12 @@ class boottime_timer final : public std::enable_shared_from_this<boottime_timer>
 /// the registered ones.
 class asio_environment final : public core::environment {
   public:
-    explicit asio_environment(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
+    explicit asio_environment(boost::asio::any_io_executor executor)
+        : executor_(std::move(executor)), process_(owning_process::of(executor_)) {}
 
     [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
+    /// The process to which what it has opened belongs.
+    [[nodiscard]] const owning_process& process() const noexcept { return *process_; }
     /// Adds a transport of this node only, which has precedence over a registered one: it has the node's keys.
     void add_transport(std::string scheme, std::unique_ptr<link_transport> carrier);
 
@@ -78,6 +82,7 @@ class asio_environment final : public core::environment {
     [[nodiscard]] link_transport* find(std::string_view scheme) const;
 
     boost::asio::any_io_executor executor_;
+    std::shared_ptr<const owning_process> process_;
     std::map<std::string, std::unique_ptr<link_transport>, std::less<>> own_transports_;
     std::random_device random_;
     std::shared_ptr<boottime_timer> timer_;

@@ -30,6 +30,8 @@ constexpr std::chrono::milliseconds pool_appears_within{2'000};
 
 class dial_errors final : public boost::system::error_category {
   public:
+    constexpr dial_errors() noexcept : error_category(0xE25D'B790'3C18'4FA6U) {} // see protocol/error.cpp
+
     [[nodiscard]] const char* name() const noexcept override { return "cles.federation"; }
     [[nodiscard]] std::string message(int) const override { return "none of its bridges is connected to NATS"; }
 };

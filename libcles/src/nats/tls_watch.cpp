@@ -57,6 +57,8 @@ struct tls_watch::callbacks {
     }
 };
 
+void tls_watch::keep_openssl() noexcept { ::OPENSSL_init_crypto(OPENSSL_INIT_NO_ATEXIT, nullptr); }
+
 bool tls_watch::prepare(natsOptions* options, bool system_authorities) {
     used_ = false;
     awaited_ = 1;

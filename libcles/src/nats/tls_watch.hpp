@@ -28,6 +28,8 @@ class tls_watch {
     /// socket is not readable until then. \pre the socket is readable
     [[nodiscard]] bool has_record(int socket) noexcept;
     /// What OpenSSL says of the last failure; empty: nothing.
+    /// To be called before OpenSSL is used: threads that are connected to NATS may outlive the functions of `atexit`.
+    static void keep_openssl() noexcept;
     [[nodiscard]] static std::string last_error();
 
   private:

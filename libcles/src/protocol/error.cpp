@@ -57,6 +57,9 @@ const entry* find(int value) noexcept {
 
 class category final : public boost::system::error_category {
   public:
+    // With an id, since a program and each of its shared libraries may have a category of their own.
+    constexpr category() noexcept : error_category(0xC8B3'5A1E'94D2'706FU) {}
+
     const char* name() const noexcept override { return "cles"; }
     std::string message(int value) const override {
         const auto* e = find(value);

@@ -34,6 +34,13 @@ constexpr std::size_t most_secure_heap = std::size_t{1} << 20U;
 constexpr std::size_t least_secure_heap = std::size_t{1} << 14U;
 constexpr std::size_t secure_block = 32;
 
+// Services in static objects use OpenSSL until they are destroyed, which may be after the functions of `atexit` have
+// run.
+ssl_ctx_st* make_context() {
+    ::OPENSSL_init_crypto(OPENSSL_INIT_NO_ATEXIT, nullptr);
+    return ::SSL_CTX_new(::TLS_method());
+}
+
 void require(bool succeeded, std::string_view what) {
     if (!succeeded) {
         throw security::security_error{std::string{what} + ": " + take_openssl_error().message()};
@@ -116,7 +123,7 @@ int select_protocol(SSL*, const unsigned char** out, unsigned char* length, cons
 
 void tls_context::free_context::operator()(ssl_ctx_st* context) const noexcept { ::SSL_CTX_free(context); }
 
-tls_context::tls_context(const security::signing_key& own) : context_(::SSL_CTX_new(::TLS_method())) {
+tls_context::tls_context(const security::signing_key& own) : context_(make_context()) {
     auto* context = context_.get();
     require(context != nullptr, "cannot prepare TLS");
     const auto key = private_key_of(own);

@@ -55,20 +55,17 @@ struct engine_bio {
     static long control(BIO*, int command, long, void*) { return command == BIO_CTRL_FLUSH ? 1 : 0; }
 
     static BIO* make(tls_engine& engine) {
-        struct free_method {
-            void operator()(BIO_METHOD* method) const noexcept { ::BIO_meth_free(method); }
-        };
-        static const std::unique_ptr<BIO_METHOD, free_method> method = [] {
-            std::unique_ptr<BIO_METHOD, free_method> made{
-                ::BIO_meth_new(::BIO_get_new_index() | BIO_TYPE_SOURCE_SINK, "cles")};
-            if (made) {
-                ::BIO_meth_set_write_ex(made.get(), write);
-                ::BIO_meth_set_read_ex(made.get(), read);
-                ::BIO_meth_set_ctrl(made.get(), control);
+        // Never freed, because engines in static objects use it until they are destroyed.
+        static const BIO_METHOD* const method = [] {
+            auto* const made = ::BIO_meth_new(::BIO_get_new_index() | BIO_TYPE_SOURCE_SINK, "cles");
+            if (made != nullptr) {
+                ::BIO_meth_set_write_ex(made, write);
+                ::BIO_meth_set_read_ex(made, read);
+                ::BIO_meth_set_ctrl(made, control);
             }
             return made;
         }();
-        auto* bio = method ? ::BIO_new(method.get()) : nullptr;
+        auto* bio = method != nullptr ? ::BIO_new(method) : nullptr;
         if (bio != nullptr) {
             ::BIO_set_data(bio, &engine);
             ::BIO_set_init(bio, 1);

@@ -30,6 +30,8 @@ std::string message_of(tls_errc code) {
 
 class category final : public boost::system::error_category {
   public:
+    constexpr category() noexcept : error_category(0x91F4'2D7C'0BE6'A853U) {} // see protocol/error.cpp
+
     [[nodiscard]] const char* name() const noexcept override { return "cles.tls"; }
 
     [[nodiscard]] std::string message(int value) const override {

@@ -276,12 +276,9 @@ void group_receiver::deliver_to_next() {
 namespace {
 
 /// The receivers of one context.
-class group_receivers final : public asio::execution_context::service {
+class group_receivers final : public asio::detail::execution_context_service_base<group_receivers> {
   public:
-    using key_type = group_receivers;
-    static inline asio::execution_context::id id;
-
-    explicit group_receivers(asio::execution_context& context) : service(context) {}
+    explicit group_receivers(asio::execution_context& context) : execution_context_service_base(context) {}
 
     std::shared_ptr<group_receiver> find(const asio::any_io_executor& executor, const core::network_interface& by,
                                          const udp::endpoint& group) {

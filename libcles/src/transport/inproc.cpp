@@ -441,7 +441,7 @@ class inproc_listeners {
 };
 
 inproc_listeners& all_inproc_listeners() {
-    static inproc_listeners instance;
+    static auto& instance = *new inproc_listeners; // services in static objects use it until they are destroyed
     return instance;
 }
 

@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -14,13 +15,14 @@ namespace {
 using table = std::map<std::string, std::unique_ptr<link_transport>, std::less<>>;
 
 table& transports() {
-    static table instance = [] {
-        table t;
-        t.emplace("tcp", transport::make_tcp());
-        t.emplace("udp", transport::make_udp());
-        t.emplace("unix", transport::make_unix());
-        t.emplace("inproc", transport::make_inproc());
-        return t;
+    // Services in static objects use it until they are destroyed.
+    static auto& instance = *[] {
+        auto t = std::make_unique<table>();
+        t->emplace("tcp", transport::make_tcp());
+        t->emplace("udp", transport::make_udp());
+        t->emplace("unix", transport::make_unix());
+        t->emplace("inproc", transport::make_inproc());
+        return t.release();
     }();
     return instance;
 }

@@ -54,6 +54,8 @@ identity identify_client(stream_socket& socket, const std::string& address, cons
 // A listener that is not trusted. The value is the id of its user.
 class listener_errors final : public boost::system::error_category {
   public:
+    constexpr listener_errors() noexcept : error_category(0xA6D9'41B3'5F0E'72C8U) {} // see protocol/error.cpp
+
     [[nodiscard]] const char* name() const noexcept override { return "cles.unix"; }
     [[nodiscard]] std::string message(int user) const override {
         return "user " + std::to_string(static_cast<std::uint32_t>(user)) +

@@ -10,8 +10,6 @@
 namespace cles::core {
 namespace {
 
-const std::vector<service_registry::offer> nobody;
-
 bool read_entry(json_reader& r, task_list& out) {
     task_list::entry found;
     std::string name;
@@ -347,6 +345,7 @@ void service_registry::on_deadline(time_point now) {
 // -- offers --------------------------------------------------------------------------------------------------------
 
 const std::vector<service_registry::offer>& service_registry::offers(verb v, std::string_view task) const {
+    static const auto& nobody = *new std::vector<offer>;
     if (task == "cles") {
         return v == verb::pull ? all_nodes_ : nobody;
     }

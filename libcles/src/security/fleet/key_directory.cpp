@@ -10,10 +10,10 @@ namespace cles::security {
 namespace {
 
 constexpr std::size_t max_key_file = 1024;
-const std::string key_file = "key";
-const std::string fleet_key_file = "fleet.key";
-const std::string roster_file = "roster";
-const std::string roster_lock = ".roster.lock";
+constexpr const char* key_file = "key";
+constexpr const char* fleet_key_file = "fleet.key";
+constexpr const char* roster_file = "roster";
+constexpr const char* roster_lock = ".roster.lock";
 
 using file_access = protected_folder::access;
 
