@@ -97,7 +97,7 @@ NOT_SANS_IO = re.compile(
 SANS_IO = {"json", "protocol", "port", "node", "federation", "security"}
 # file -> such headers that it may include and use nevertheless, each with a reason.
 WITHOUT_IO = {
-    "libcles/src/node/base/ip_network.cpp": {"arpa/inet.h"},  # inet_pton and inet_ntop read and write text
+    "libcles/src/port/ip_network.cpp": {"arpa/inet.h"},  # inet_pton and inet_ntop read and write text
     "libcles/src/security/datagrams/fork_count.cpp": {"pthread.h"},  # pthread_atfork: keys must not be used on in a child process
     "libcles/src/security/core_dumps.cpp": {"sys/prctl.h", "sys/resource.h"},  # limits of the process
     # Files of keys and plugins; each is checked after it has been opened.

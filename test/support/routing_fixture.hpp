@@ -13,6 +13,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace cles::test {
 
@@ -22,7 +23,10 @@ struct routing_fixture {
     /// Of a secured fleet, with a client that is a member.
     routing_fixture(std::shared_ptr<core::node_security> security, const std::string& client,
                     core::other_pools* pools = nullptr)
-        : node({}, {}, {}, {}, std::move(security), nullptr, pools), link(node, client) {}
+        : node(
+              {}, {}, [this](log_level, const log_entry& entry) { logged.emplace_back(entry.text); }, {},
+              std::move(security), nullptr, pools),
+          link(node, client) {}
     routing_fixture(const routing_fixture&) = delete;
     routing_fixture& operator=(const routing_fixture&) = delete;
     ~routing_fixture() { routing->stop(); }
@@ -67,6 +71,7 @@ struct routing_fixture {
 
     void have_turn() { routing->begin_ready(node.clock.now()); }
 
+    std::vector<std::string> logged; ///< with security
     test_node node;
     recorded_next_hop ways;
     int wakes = 0;

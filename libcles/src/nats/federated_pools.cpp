@@ -363,7 +363,7 @@ void federated_pools::on_timer(boost::system::error_code code) {
 void federated_pools::on_event(const event& e) {
     const auto log_once = [this, &e](const std::string& text) {
         last_problem_ = e.text;
-        if (logged_.add(text)) {
+        if (logged_.take({.kind = "nats", .text = text, .most = 32, .in = std::chrono::hours{24}}, now())) {
             log(log_level::warning, text);
         }
     };
@@ -382,7 +382,7 @@ void federated_pools::on_event(const event& e) {
 void federated_pools::on_connected(const event& e) {
     log(log_level::info, "connected to NATS, as a bridge of the pool '" + options_.pool + "'");
     last_problem_.clear();
-    logged_.clear();
+    logged_ = {};
     connection_->use(e.connection);
     if (!is_secured_) {
         std::random_device random;

@@ -5,11 +5,11 @@
 #include <cles/link.hpp>
 
 #include "federation/bridge.hpp"
-#include "federation/logged_problems.hpp"
 #include "federation/sealed_channel.hpp"
 #include "nats/nats_connection.hpp"
 #include "nats/pool_link.hpp"
 #include "node/routing/other_pools.hpp"
+#include "port/log_budget.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/executor_work_guard.hpp>
@@ -145,7 +145,7 @@ class federated_pools final : public core::other_pools,
     std::uint64_t updates_dropped_ = 0;                                    // that the node's links did not take
     std::list<waiting_dial> dials_;
     std::string last_problem_;
-    bridging::logged_problems logged_; // since it was connected
+    core::log_budget logged_; // since it was connected
     std::uint32_t last_link_ = 0;
     std::uint64_t last_dial_ = 0;
     bool claimed_ = false;

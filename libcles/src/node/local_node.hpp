@@ -7,7 +7,6 @@
 #include <cles/multicast.hpp>
 
 #include "node/base/deadlines.hpp"
-#include "node/base/ip_network.hpp"
 #include "node/base/peer_reply.hpp"
 #include "node/flush_scheduler.hpp"
 #include "node/membership/discovery.hpp"
@@ -18,6 +17,7 @@
 #include "node/routing/router.hpp"
 #include "node/session/connections.hpp"
 #include "port/environment.hpp"
+#include "port/ip_network.hpp"
 
 #include <chrono>
 #include <cstdint>

@@ -8,13 +8,6 @@
 #include <utility>
 
 namespace cles::core {
-namespace {
-
-std::string left_out_text(std::uint64_t lines) {
-    return lines == 0 ? std::string{} : " (and " + std::to_string(lines) + " since the last such line)";
-}
-
-} // namespace
 
 node_state::node_state(node_options setup, const core::clock& source, const std::function<void()>& wake)
     : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
@@ -75,7 +68,7 @@ void node_state::log_drop(std::string_view host, std::string_view what, std::str
     if (!log) {
         return;
     }
-    const auto left_out = (malformed ? malformed_drops : other_drops).take(host, time.now());
+    const auto left_out = logged.take({.kind = malformed ? "malformed" : "dropped", .source = host}, time.now());
     if (!left_out) {
         return;
     }
@@ -85,12 +78,12 @@ void node_state::log_drop(std::string_view host, std::string_view what, std::str
              std::string{host});
 }
 
-void node_state::log_denial(std::string_view source, std::string what, std::string peer) {
+void node_state::log_denial(std::string_view source, std::string_view peer, const std::function<std::string()>& text) {
     if (!log) {
         return;
     }
-    if (const auto left_out = denials.take(source, time.now())) {
-        post_log(log_level::info, std::move(what) + left_out_text(*left_out), std::move(peer));
+    if (const auto left_out = logged.take({.kind = "denied", .source = source, .most = 8}, time.now())) {
+        post_log(log_level::info, text() + left_out_text(*left_out), std::string{peer});
     }
 }
 

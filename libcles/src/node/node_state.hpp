@@ -8,7 +8,6 @@
 
 #include "node/base/completion_queue.hpp"
 #include "node/base/deadlines.hpp"
-#include "node/base/log_budget.hpp"
 #include "node/base/memory_budget.hpp"
 #include "node/base/metrics.hpp"
 #include "node/membership/membership.hpp"
@@ -16,6 +15,7 @@
 #include "node/session/datagram_rules.hpp"
 #include "node/session/task_execution.hpp"
 #include "port/environment.hpp"
+#include "port/log_budget.hpp"
 
 #include <cstdint>
 #include <functional>
@@ -115,12 +115,11 @@ struct node_state {
     /// anything else is told at `debug`. The text must not be of the peer.
     [[gnu::cold]] void log_drop(std::string_view host, std::string_view what, std::string_view why, bool malformed);
     /// Logs that a request was denied, at `info`, a few times a minute for each source: the name of the peer, or its
-    /// host.
-    [[gnu::cold]] void log_denial(std::string_view source, std::string what, std::string peer);
+    /// host. The text is made only then.
+    [[gnu::cold]] void log_denial(std::string_view source, std::string_view peer,
+                                  const std::function<std::string()>& text);
 
-    log_budget malformed_drops;
-    log_budget other_drops;
-    log_budget denials{8};
+    log_budget logged;
 };
 
 } // namespace cles::core

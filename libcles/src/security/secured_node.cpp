@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 
+#include "port/ip_network.hpp"
 #include "security/datagrams/sealed_group_port.hpp"
 #include "security/keys/signed_text.hpp"
 #include "security/messages/sealed_messages.hpp"
@@ -32,8 +33,16 @@ void secured_node::log(log_level level, std::string text) const {
 }
 
 void secured_node::log_refused_link(const refused_link& link) {
-    if (time_ != nullptr && refused_.take(link, time_->now())) {
-        log(log_level::warning, text_of(link));
+    log_refusal(log_kind_of(link.kind), link.source, link.why, text_of(link));
+}
+
+void secured_node::log_refusal(std::string_view kind, std::string_view source, std::string_view why, std::string text) {
+    if (time_ == nullptr) {
+        return;
+    }
+    const auto whose = core::share_of_address(source);
+    if (const auto left_out = refusals_.take({.kind = kind, .source = whose, .text = why, .most = 4}, time_->now())) {
+        log(log_level::warning, text.append(core::left_out_text(*left_out)));
     }
 }
 

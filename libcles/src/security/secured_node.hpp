@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "port/log_budget.hpp"
 #include "port/node_security.hpp"
 #include "security/access/access_policy.hpp"
 #include "security/datagrams/sealed_datagrams.hpp"
 #include "security/fleet/fleet.hpp"
 #include "security/fleet/key_directory.hpp"
-#include "security/refused_links.hpp"
+#include "security/refused_link.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -38,7 +39,7 @@ class secured_node : public core::node_security {
     [[nodiscard]] const std::shared_ptr<sealed_datagrams>& datagrams() const noexcept { return datagrams_; }
     /// Writes to the node's log.
     void log(log_level level, std::string text) const;
-    /// Warns of a link that was not opened, and why, as far as `refused_links` permits.
+    /// Warns of a link that was not opened, and why: a few times a minute for each kind and source.
     void log_refused_link(const refused_link& link);
 
     // node_security
@@ -76,6 +77,7 @@ class secured_node : public core::node_security {
         std::chrono::seconds pause{};
     };
 
+    void log_refusal(std::string_view kind, std::string_view source, std::string_view why, std::string text);
     void on_roster();
     void adopt_changes();
     void store();
@@ -100,7 +102,7 @@ class secured_node : public core::node_security {
     std::shared_ptr<sealed_datagrams> datagrams_;
     core::security_observer* observer_ = nullptr;
     const core::clock* time_ = nullptr; // since `begin`
-    refused_links refused_;
+    core::log_budget refusals_;
     std::shared_ptr<void> observation_; // of the fleet
     std::map<std::string, asked_member, std::less<>> asked_;
     directory_state files_; // at the last check

@@ -4,7 +4,7 @@
 #include <cles/link.hpp>
 
 #include "security/fleet/fleet.hpp"
-#include "security/refused_links.hpp"
+#include "security/refused_link.hpp"
 
 #include <chrono>
 #include <functional>

@@ -4,7 +4,7 @@
 #include <cles/error.hpp>
 #include <cles/url.hpp>
 
-#include "node/base/ip_network.hpp"
+#include "port/ip_network.hpp"
 
 #include <algorithm>
 #include <cstddef>

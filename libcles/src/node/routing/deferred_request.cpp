@@ -78,8 +78,8 @@ bool any_request::begin(time_point now) {
     if (retry_after_) {
         give_up(retry_after_->reported, retry_after_->may_have_started);
     } else if (is_held_back(chosen)) {
-        call_->fail(no_passage(routing_->host(), passage::not_forwarded, origin_.requester, "any", request_->verb,
-                               request_->noun.path));
+        call_->fail(
+            no_passage(routing_->host(), passage::not_forwarded, origin_, "any", request_->verb, request_->noun.path));
     } else {
         call_->fail(routing_->no_provider(*request_));
     }
@@ -269,7 +269,7 @@ scatter_gather::part* scatter_gather::add(std::string node) {
     auto& added = parts_.emplace_back();
     added.node = std::move(node);
     if (found != passage::permitted) {
-        added.failure = no_passage(routing_->host(), found, origin_.requester, added.node, r.verb, r.noun.path);
+        added.failure = no_passage(routing_->host(), found, origin_, added.node, r.verb, r.noun.path);
     }
     return &added;
 }

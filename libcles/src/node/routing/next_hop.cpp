@@ -225,25 +225,22 @@ adverb_list forwarded_adverbs(const protocol::request_line& r, std::uint8_t hops
     return out;
 }
 
-std::optional<forwarding_permit> forwarding_permit::ask(const node_state& n, const protocol::request_line& r,
+std::optional<forwarding_permit> forwarding_permit::ask(node_state& n, const protocol::request_line& r,
                                                         const request_origin& by, std::string_view node,
                                                         protocol::failure& why) {
-    const auto found = may_pass_on(n, by, node, r.verb, r.noun);
-    if (found != passage::permitted) {
-        why = no_passage(n, found, by.requester, node, r.verb, r.noun.path);
+    if (const auto found = may_pass_on(n, by, node, r.verb, r.noun); found != passage::permitted) {
+        why = no_passage(n, found, by, node, r.verb, r.noun.path);
         return std::nullopt;
     }
     return forwarding_permit{node, r.via, stated_requester(by, n.name),
                              forwarded_adverbs(r, hops_after(r), n.name, by).text};
 }
 
-std::optional<forwarding_permit> forwarding_permit::ask(const node_state& n, const request_origin& by,
-                                                        std::string_view node, verb how, std::string_view path,
-                                                        std::string_view via, std::string adverbs,
-                                                        protocol::failure& why) {
-    const auto found = may_pass_on(n, by, node, how, path);
-    if (found != passage::permitted) {
-        why = no_passage(n, found, by.requester, node, how, path);
+std::optional<forwarding_permit> forwarding_permit::ask(node_state& n, const request_origin& by, std::string_view node,
+                                                        verb how, std::string_view path, std::string_view via,
+                                                        std::string adverbs, protocol::failure& why) {
+    if (const auto found = may_pass_on(n, by, node, how, path); found != passage::permitted) {
+        why = no_passage(n, found, by, node, how, path);
         return std::nullopt;
     }
     return forwarding_permit{node, via, stated_requester(by, n.name), std::move(adverbs)};

@@ -60,12 +60,12 @@ std::size_t max_further_adverbs(const protocol::request_line& request) noexcept;
 /// forward is asked for on every way out of this node. Valid as long as what it is made from.
 class forwarding_permit {
   public:
-    /// For the request `r`, of that origin, to `node`. Nothing, with the reason, if it may not leave.
-    static std::optional<forwarding_permit> ask(const node_state& n, const protocol::request_line& r,
+    /// For the request `r`, of that origin, to `node`. Nothing, with the reason, if it may not leave; that is logged.
+    static std::optional<forwarding_permit> ask(node_state& n, const protocol::request_line& r,
                                                 const request_origin& by, std::string_view node,
                                                 protocol::failure& why);
     /// The same for a request of which only this is left. \param adverbs as `forwarded_adverbs` has written them
-    static std::optional<forwarding_permit> ask(const node_state& n, const request_origin& by, std::string_view node,
+    static std::optional<forwarding_permit> ask(node_state& n, const request_origin& by, std::string_view node,
                                                 verb how, std::string_view path, std::string_view via,
                                                 std::string adverbs, protocol::failure& why);
 

@@ -181,7 +181,7 @@ void relayed_bindings::bind(const forwarding_permit& permit, const relayed_path&
             const auto& by = noun.path.by;
             const auto may = may_pass_on(from_->host(), by, noun.node, verb::bind, noun.path.text);
             if (may != passage::permitted) {
-                waits->fail(no_passage(from_->host(), may, by.requester, noun.node, verb::bind, noun.path.text));
+                waits->fail(no_passage(from_->host(), may, by, noun.node, verb::bind, noun.path.text));
                 return;
             }
             if (!waits->can_answer(last.size())) {

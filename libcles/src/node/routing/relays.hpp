@@ -54,7 +54,7 @@ class relays final : public topic_source {
     void release(topic& t) override;
     void admit(topic&) override {}
 
-    [[nodiscard]] const node_state& host() const noexcept { return node_; }
+    [[nodiscard]] node_state& host() const noexcept { return node_; }
 
   private:
     class relay;

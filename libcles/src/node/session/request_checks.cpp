@@ -9,6 +9,7 @@
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <exception>
 #include <utility>
 
@@ -104,8 +105,10 @@ std::string how_to_permit_forwarding(std::string_view forwarder, std::string_vie
     return "(cles fleet rights " + std::string{forwarder} + " --forwards " + std::string{requester} + ")";
 }
 
-protocol::failure no_passage(const node_state& n, passage why, std::string_view requester, std::string_view node,
-                             verb how, std::string_view path) {
+namespace {
+
+protocol::failure reason_of(const node_state& n, passage why, std::string_view requester, std::string_view node,
+                            verb how, std::string_view path) {
     return {.code = errc::denied,
             .message = why == passage::not_forwarded
                            ? n.name + " may not forward requests of " + std::string{requester} + " to " +
@@ -113,9 +116,6 @@ protocol::failure no_passage(const node_state& n, passage why, std::string_view 
                            : not_allowed(n, how, path)};
 }
 
-namespace {
-
-// Requests that every member may send: they concern its own link, or security itself.
 bool is_exempt(const protocol::noun_view& noun) noexcept {
     if (noun.task != "cles" || noun.parameters.empty()) {
         return false;
@@ -154,21 +154,45 @@ protocol::failure denial(const node_state& n, const identity& peer, const protoc
         }
         if (n.security->is_member(by.requester) && !protocol::is_reserved_target(r.noun.target) &&
             !is_local_target(n, r)) {
-            return no_passage(n, may_pass_on(n, by, r.noun.target, r.verb, r.noun), by.requester, r.noun.target, r.verb,
-                              r.noun.path);
+            return reason_of(n, may_pass_on(n, by, r.noun.target, r.verb, r.noun), by.requester, r.noun.target, r.verb,
+                             r.noun.path);
         }
     }
     return {.code = errc::denied, .message = not_allowed(n, r.verb, r.noun.path)};
 }
 
+// "op, which states from='car3', was denied PULL car1:speed: ..."
+std::string denial_text(std::string who, std::string_view from, verb how, std::string_view node, std::string_view path,
+                        std::string_view why) {
+    constexpr std::size_t longest = 128;
+    std::string noun{node};
+    noun.append(":").append(path);
+    if (noun.size() > longest) {
+        noun.replace(longest, std::string::npos, "...");
+    }
+    who.append(from.empty() ? "" : ", which states from=" + protocol::quoted(from) + ",");
+    return who.append(" was denied ").append(to_string(how)).append(" ").append(noun).append(": ").append(why);
+}
+
 } // namespace
 
 void log_denial(node_state& n, const identity& peer, const protocol::request_line& r, std::string_view why) {
-    auto what = "denied " + request_text(r.verb, r.noun.path);
-    const auto source = peer.name.empty() ? holder_of(peer) : peer.name;
-    what.append(" of ").append(source);
-    what.append(r.from.empty() ? "" : ", which states from=" + protocol::quoted(r.from)).append(": ").append(why);
-    n.log_denial(source, std::move(what), peer.address);
+    const std::string source{peer.name.empty() ? holder_of(peer) : peer.name};
+    n.log_denial(source, peer.address, [&] {
+        const auto node = is_local_target(n, r) ? std::string_view{n.name} : r.noun.target;
+        return denial_text(source, r.from, r.verb, node, r.noun.path, why);
+    });
+}
+
+protocol::failure no_passage(node_state& n, passage why, const request_origin& by, std::string_view node, verb how,
+                             std::string_view path) {
+    auto failure = reason_of(n, why, by.requester, node, how, path);
+    const bool is_forwarded = !by.forwarder.empty();
+    const std::string source{is_forwarded ? by.forwarder : by.requester};
+    n.log_denial(source, {}, [&] {
+        return denial_text(source, is_forwarded ? by.requester : std::string_view{}, how, node, path, failure.message);
+    });
+    return failure;
 }
 
 bool allows(const node_state& n, const identity& peer, const protocol::request_line& r) {

@@ -72,9 +72,9 @@ passage may_pass_on(const node_state& n, const request_origin& by, std::string_v
 /// The same for a path of that node.
 passage may_pass_on(const node_state& n, const request_origin& by, std::string_view node, verb how,
                     std::string_view path);
-/// Why it may not leave: "car1 may not forward requests of sat1 to car2 (...)".
-[[gnu::cold]] protocol::failure no_passage(const node_state& n, passage why, std::string_view requester,
-                                           std::string_view node, verb how, std::string_view path);
+/// Why it may not leave: "car1 may not forward requests of sat1 to car2 (...)". Logs it as `log_denial` does.
+[[gnu::cold]] protocol::failure no_passage(node_state& n, passage why, const request_origin& by, std::string_view node,
+                                           verb how, std::string_view path);
 
 /// Whether this node may forward for the requester; itself, and without security, for all.
 bool may_forward_for(const node_state& n, std::string_view requester);

@@ -128,6 +128,8 @@ BOOST_AUTO_TEST_CASE(without_the_right_to_forward_none_does) {
             BOOST_TEST(f.left() == before);
             BOOST_TEST(reply.find(why) != std::string::npos, reply);
             BOOST_TEST((reply.find(R"("results":{})") != std::string::npos) == each.is_gathered, reply);
+            BOOST_REQUIRE(!f.logged.empty());
+            BOOST_TEST(f.logged.front().starts_with("sat1 was denied "), f.logged.front());
         }
     }
     for (const auto& each : ways_of_refused_requests) {

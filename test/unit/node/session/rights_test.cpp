@@ -51,8 +51,9 @@ BOOST_AUTO_TEST_CASE(a_denial_names_all_of_the_noun_and_is_logged) {
     security->denied.insert("car2 PULL car1:cles/metrics");
     BOOST_TEST(car2.reply("PULL car1:cles/metrics id=7").message == "car1 does not allow PULL 'cles/metrics'");
     BOOST_REQUIRE_EQUAL(logged.size(), 1U);
-    BOOST_TEST(logged.front() == "info: denied PULL 'cles/metrics' of car2: car1 does not allow PULL 'cles/metrics' "
-                                 "[tcp://127.0.0.1:1]");
+    BOOST_TEST(logged.front() ==
+               "info: car2 was denied PULL car1:cles/metrics: car1 does not allow PULL 'cles/metrics' "
+               "[tcp://127.0.0.1:1]");
 
     for (int i = 0; i < 20; ++i) { // a peer does not fill the log
         car2.kind("PULL car1:cles/metrics id=8");

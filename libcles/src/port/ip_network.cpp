@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/base/ip_network.hpp"
+#include "port/ip_network.hpp"
 
 #include <cles/error.hpp>
 
-#include "json/json_scan.hpp"
+#include "protocol/grammar.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -32,8 +32,8 @@ std::optional<unsigned> parse_bits(std::string_view text, unsigned most) noexcep
     if (text.size() > 3) {
         return {};
     }
-    unsigned bits = 0;
-    return json_detail::read_number(text, bits) && bits <= most ? std::optional{bits} : std::nullopt;
+    const auto bits = protocol::number_between(text, 0, most);
+    return bits ? std::optional{static_cast<unsigned>(*bits)} : std::nullopt;
 }
 
 } // namespace

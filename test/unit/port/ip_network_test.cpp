@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/error.hpp>
 
-#include "node/base/ip_network.hpp"
+#include "port/ip_network.hpp"
 
 #include <boost/test/unit_test.hpp>
 
