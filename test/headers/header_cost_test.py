@@ -19,7 +19,7 @@ from pathlib import Path
 # What the types in the interface of `service.hpp` need: containers and functions, executors, and coroutines.
 NEEDED = ("any", "functional", "map", "memory", "optional", "span", "string", "string_view", "unordered_map",
           "variant", "vector", "boost/asio/any_io_executor.hpp", "boost/asio/use_awaitable.hpp")
-MOST_BEYOND = 0.041  # of the lines that these have
+MOST_BEYOND = 0.049  # of the lines that these have
 
 AWAITING = """
 #include <cles/service.hpp>

@@ -163,6 +163,55 @@ BOOST_AUTO_TEST_CASE(handlers_that_only_move_serve_every_verb) {
     BOOST_TEST(ask(R"(UPDATE car1:update {"a":1})") == "{}");
 }
 
+// -- parameters ----------------------------------------------------------------------------------------------------
+
+using texts = std::vector<std::string>;
+
+std::string joined(const texts& all) {
+    std::string out;
+    for (const auto& each : all) {
+        out += each + ";";
+    }
+    return out;
+}
+
+std::string free_function(texts all) { return joined(all); }
+
+BOOST_AUTO_TEST_CASE(texts_are_the_parameters_of_pull_and_bind_and_the_body_of_other_verbs) {
+    nodes n;
+    n.car.on_pull("function", free_function);
+    n.car.on_pull("request",
+                  [](const cles::request& r, const texts& all) { return std::string{r.node()} + joined(all); });
+    n.car.on_pull("coroutine", [](texts all) -> asio::awaitable<std::string> {
+        asio::steady_timer pause{co_await asio::this_coro::executor, 1ms};
+        co_await pause.async_wait(asio::use_awaitable);
+        co_return joined(all);
+    });
+    n.car.on_pull("moves", [only = std::make_unique<int>(7)](texts all) { return all.size() + *only; });
+    std::string bound;
+    n.car.on_bind("function", [&](texts all) { bound = joined(all); });
+    n.car.on_push("function", free_function);
+    n.car.on_delegate("function", free_function);
+    const auto ask = [&](const std::string& command) {
+        answer<> got;
+        n.tower.async_request(command, got.options(), got.take());
+        run_until(n.io, [&] { return got.done(); });
+        return got.code ? got.words : got.value.text;
+    };
+    BOOST_TEST(ask("PULL car1:function") == R"({"value":""})");
+    BOOST_TEST(ask("PULL car1:function/UTC/a%20b") == R"({"value":"UTC;a b;"})");
+    BOOST_TEST(ask("PULL car1:request/UTC") == R"({"value":"car1UTC;"})");
+    BOOST_TEST(ask("PULL car1:coroutine/UTC") == R"({"value":"UTC;"})");
+    BOOST_TEST(ask("PULL car1:moves/a/b") == R"({"value":9})");
+    BOOST_TEST(ask(R"(PUSH car1:function/UTC ["x"])") == R"({"value":"x;"})");
+    BOOST_TEST(ask(R"(DELEGATE car1:function ["x","y"])") == R"({"value":"x;y;"})");
+    answer<cles::feed<cles::json_text>> feed;
+    n.tower.async_bind("car1:function/fast", feed.take());
+    run_until(n.io, [&] { return feed.done(); });
+    BOOST_TEST(!feed.code);
+    BOOST_TEST(bound == "fast;");
+}
+
 // -- types ---------------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(types_of_the_standard_library_are_sent_and_received) {

@@ -22,11 +22,12 @@
 ///
 /// Supported types:
 ///
-/// - `bool`, integers of up to 64 bits, floating-point numbers, strings, and enums described with
-///   `BOOST_DESCRIBE_ENUM`, by name;
+/// - `bool`, integers of up to 64 bits, characters (as numbers), floating-point numbers and strings;
+/// - enums described with `BOOST_DESCRIBE_ENUM`, by name, or as a number if they combine flags by an operator `|`;
 /// - `std::vector`, `std::array`, `std::tuple` and `std::pair` as arrays;
-/// - structs described with `BOOST_DESCRIBE_STRUCT` (including described bases), and `std::map` and
-///   `std::unordered_map` with keys of type `std::string`, as objects;
+/// - structs described with `BOOST_DESCRIBE_STRUCT`, and classes with `BOOST_DESCRIBE_CLASS`, as objects, with their
+///   described bases and private members;
+/// - `std::map` and `std::unordered_map` with keys of type `std::string`, integers and described enums, as objects;
 /// - `std::optional` as its value or null, `std::variant` as the value that it holds (`<cles/convert_variant.hpp>`);
 /// - `std::chrono` durations and points in time of the system clock as ISO 8601 (`<cles/convert_chrono.hpp>`);
 /// - `json_text`, JSON that is passed through, and `boost::json::value` with `<cles/json_value.hpp>`.
@@ -38,8 +39,8 @@
 /// member that is missing or has the wrong type is an error that names the path to it, as in "route[2].lat: expected a
 /// number, got a string".
 ///
-/// What readers refuse is not written: text that is not UTF-8, brackets nested deeper than 35 levels, a number or time
-/// that has no JSON form. Then `to_json` throws, and nothing is sent.
+/// What readers refuse is not written: text that is not UTF-8, brackets nested deeper than 35 levels, a number, time or
+/// enum that has no JSON form. Then `to_json` throws, and nothing is sent.
 ///
 /// A `const char*` that is null is written as null. An array of `char` is text that ends at its first zero, or with the
 /// array.
@@ -59,6 +60,21 @@ concept described_struct = std::is_class_v<T> && requires(T** type) {
 template <class T>
 concept described_enum = std::is_enum_v<T> && boost::describe::has_describe_enumerators<T>::value;
 
+/// Integers of up to 64 bits and characters, but not `bool`.
+template <class T>
+concept whole = std::integral<T> && !std::same_as<T, bool> && sizeof(T) <= sizeof(std::int64_t);
+
+/// The integer of 64 bits that holds every T.
+template <whole T>
+using widest = std::conditional_t<std::is_signed_v<T>, std::int64_t, std::uint64_t>;
+
+/// As `std::in_range`, which takes no characters.
+template <whole To, whole From>
+constexpr bool fits(From number) noexcept {
+    using like_to = std::conditional_t<std::is_signed_v<To>, std::make_signed_t<To>, std::make_unsigned_t<To>>;
+    return std::in_range<like_to>(static_cast<widest<From>>(number));
+}
+
 } // namespace detail
 
 /// JSON text as a value. Reading copies it; writing validates it and removes its white space.
@@ -74,7 +90,9 @@ struct json_text {
 /// - `static void write(json_writer&, const T&)`,
 /// - `static bool read(json_reader&, T&)`, and
 /// - `static constexpr bool is_scalar = true;` if T is written as neither an object nor an array, because scalars are
-///   sent as {"value":x}.
+///   sent as {"value":x};
+/// - optionally `static constexpr std::string_view schema`, a JSON Schema of what `read` accepts, for programs that
+///   tell their types (<cles/types.hpp>).
 template <class T>
 struct converter;
 
@@ -87,6 +105,76 @@ concept writable = requires(json_writer& w, const T& value) {
 template <class T>
 concept readable = requires(json_reader& r, T& value) {
     static_cast<bool>(converter<T>::read(r, value));
+};
+
+template <class... T>
+struct types {};
+
+/// Types of the standard library that convert if those in `converter<T>::parts` do.
+template <class T>
+concept has_parts = requires {
+    typename converter<T>::parts;
+};
+
+template <class Parts>
+inline constexpr bool all_made = true;
+template <class... T>
+inline constexpr bool all_made<types<T...>> = (std::is_default_constructible_v<T> && ...);
+/// Whether reading can make what a container, an optional or a variant holds. Arrays and the like, which cannot be made
+/// either, are there before.
+template <class T>
+inline constexpr bool parts_are_made = true;
+template <has_parts T>
+inline constexpr bool parts_are_made<T> = !std::is_default_constructible_v<T> || all_made<typename converter<T>::parts>;
+
+/// The first type in T, or T itself, that cannot be written; void if there is none.
+template <class T>
+struct unwritable {
+    using type = T;
+};
+template <class Parts>
+struct first_unwritable {
+    using type = void;
+};
+template <writable T>
+struct unwritable<T> {
+    using type = void;
+};
+template <writable T>
+    requires has_parts<T>
+struct unwritable<T> : first_unwritable<typename converter<T>::parts> {
+};
+template <class T, class... More>
+struct first_unwritable<types<T, More...>> : std::conditional_t<std::is_void_v<typename unwritable<T>::type>,
+                                                                first_unwritable<types<More...>>, unwritable<T>> {};
+
+/// The same for reading.
+template <class T>
+struct unreadable {
+    using type = T;
+};
+template <class Parts>
+struct first_unreadable {
+    using type = void;
+};
+template <readable T>
+struct unreadable<T> {
+    using type = void;
+};
+template <readable T>
+    requires has_parts<T>
+struct unreadable<T> : first_unreadable<typename converter<T>::parts> {
+};
+template <class T, class... More>
+struct first_unreadable<types<T, More...>> : std::conditional_t<std::is_void_v<typename unreadable<T>::type>,
+                                                                first_unreadable<types<More...>>, unreadable<T>> {};
+
+/// How a key of a map is written and read; only defined for texts, integers and described enums.
+template <class Key>
+struct map_key;
+template <class Key>
+concept usable_as_key = requires {
+    sizeof(map_key<Key>);
 };
 
 } // namespace detail
@@ -107,7 +195,11 @@ bool read_json(json_reader& r, T& value) {
     static_assert(detail::readable<T>, "this type cannot be read from JSON: describe a struct with "
                                        "BOOST_DESCRIBE_STRUCT, an enum with BOOST_DESCRIBE_ENUM, or specialise "
                                        "cles::converter (see <cles/convert.hpp>)");
-    if constexpr (detail::readable<T>) {
+    constexpr bool made_first = detail::parts_are_made<T>;
+    static_assert(made_first,
+                  "what a container, an optional or a variant holds needs a default constructor: it is made "
+                  "first, and then read");
+    if constexpr (detail::readable<T> && made_first) {
         return converter<T>::read(r, value);
     } else {
         return false;
@@ -159,12 +251,16 @@ bool from_json(std::string_view text, T& value, std::string* why = nullptr) {
 /// \throws cles::error with `errc::conversion`
 template <class T>
 T from_json(std::string_view text) {
-    T value{};
-    std::string why;
-    if (!cles::from_json(text, value, &why)) {
-        throw error(errc::conversion, why);
+    constexpr bool made_first = std::is_default_constructible_v<T>;
+    static_assert(made_first, "the type needs a default constructor: a value is made first, and then read");
+    if constexpr (made_first) {
+        T value{};
+        std::string why;
+        if (!cles::from_json(text, value, &why)) {
+            throw error(errc::conversion, why);
+        }
+        return value;
     }
-    return value;
 }
 
 namespace detail {
@@ -192,18 +288,17 @@ struct converter<bool> {
     static bool read(json_reader& r, bool& value) { return r.read(value); }
 };
 
-/// Wider integers, such as `__int128`, do not convert: no other program could read their numbers.
-template <class T>
-    requires(std::integral<T> && !std::same_as<T, bool> && sizeof(T) <= sizeof(std::int64_t))
+/// Characters are numbers, as in C. Wider integers, such as `__int128`, do not convert: no other program could read
+/// their numbers.
+template <detail::whole T>
 struct converter<T> {
-    using wide = std::conditional_t<std::is_signed_v<T>, std::int64_t, std::uint64_t>;
-    static void write(json_writer& w, T value) { w.value(static_cast<wide>(value)); }
+    static void write(json_writer& w, T value) { w.value(static_cast<detail::widest<T>>(value)); }
     static bool read(json_reader& r, T& value) {
-        wide number{};
+        detail::widest<T> number{};
         if (!r.read(number)) {
             return false;
         }
-        if (!std::in_range<T>(number)) {
+        if (!detail::fits<T>(number)) {
             return r.fail("an integer out of range");
         }
         value = static_cast<T>(number);
@@ -214,10 +309,14 @@ struct converter<T> {
 template <std::floating_point T>
 struct converter<T> {
     static void write(json_writer& w, T value) {
-        const auto number = static_cast<double>(value);
-        w.value(sizeof(T) > sizeof(double)
-                    ? detail::require_finite(number, detail::is_finite(value), "a number out of the range of a double")
-                    : number);
+        if constexpr (sizeof(T) > sizeof(double)) {
+            w.value(detail::require_finite(static_cast<double>(value), detail::is_finite(value),
+                                           "a number out of the range of a double"));
+        } else if constexpr (sizeof(T) < sizeof(double)) {
+            w.value(static_cast<float>(value));
+        } else {
+            w.value(static_cast<double>(value));
+        }
     }
     static bool read(json_reader& r, T& value) {
         if (r.peek() == json_reader::kind::null) { // how numbers that are not finite are written
@@ -271,6 +370,7 @@ struct converter<json_text> {
 
 template <class T>
 struct converter<std::optional<T>> {
+    using parts = detail::types<T>;
     static void write(json_writer& w, const std::optional<T>& value) {
         if (value) {
             cles::write_json(w, *value);

@@ -58,7 +58,7 @@ whole_time whole_of(const std::chrono::duration<Rep, Period>& value) {
     if constexpr (std::is_floating_point_v<Rep>) {
         return detail::whole_of(detail::seconds_of(value));
     } else {
-        if (!std::in_range<std::int64_t>(value.count())) {
+        if (!detail::fits<std::int64_t>(value.count())) {
             throw_time_out_of_range();
         }
         return detail::whole_of(static_cast<std::int64_t>(value.count()), Period::num, Period::den);
@@ -78,7 +78,7 @@ bool from_whole(json_reader& r, whole_time from, std::chrono::duration<Rep, Peri
         return detail::from_seconds(r, detail::seconds_of(from), value);
     } else {
         std::int64_t count = 0;
-        if (!count_units(from, Period::num, Period::den, count) || !std::in_range<Rep>(count)) {
+        if (!count_units(from, Period::num, Period::den, count) || !detail::fits<Rep>(count)) {
             return r.fail(time_out_of_range);
         }
         value = std::chrono::duration<Rep, Period>(static_cast<Rep>(count));

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <string_view>
@@ -34,11 +35,37 @@ bool read_elements(json_reader& r, Sequence& out) {
     return r.ok();
 }
 
+template <>
+struct map_key<std::string> {
+    static const std::string& text(const std::string& key) noexcept { return key; }
+    static bool read(json_reader&, std::string_view text, std::string& key) {
+        key = text;
+        return true;
+    }
+};
+
+/// False if the text is not an integer as it is written, or out of range.
+bool read_integer_key(json_reader& r, std::string_view text, std::int64_t& key);
+bool read_integer_key(json_reader& r, std::string_view text, std::uint64_t& key);
+
+template <whole Key>
+struct map_key<Key> {
+    static std::string text(Key key) { return std::to_string(static_cast<widest<Key>>(key)); }
+    static bool read(json_reader& r, std::string_view text, Key& key) {
+        widest<Key> number{};
+        if (!read_integer_key(r, text, number)) {
+            return false;
+        }
+        key = static_cast<Key>(number);
+        return detail::fits<Key>(number) || r.fail("the key is out of range");
+    }
+};
+
 template <class Map>
 void write_members(json_writer& w, const Map& values) {
     w.begin_object();
     for (const auto& member : values) { // a structured binding would call `get` of the namespace of the values
-        w.key(member.first);
+        w.key(map_key<typename Map::key_type>::text(member.first));
         cles::write_json(w, member.second);
     }
     w.end_object();
@@ -50,11 +77,17 @@ bool read_members(json_reader& r, Map& values) {
     if (!r.begin_object()) {
         return false;
     }
-    std::string_view key;
-    while (r.next_key(key)) {
-        const auto at = values.try_emplace(std::string{key}).first;
+    using key_type = typename Map::key_type;
+    std::string_view text;
+    while (r.next_key(text)) {
+        key_type key{};
+        if (!map_key<key_type>::read(r, text, key)) {
+            r.inside_member(text);
+            return false;
+        }
+        const auto at = values.try_emplace(std::move(key)).first;
         if (!cles::read_json(r, at->second)) {
-            r.inside_member(at->first);
+            r.inside_member(map_key<key_type>::text(at->first));
             return false;
         }
     }
@@ -94,6 +127,7 @@ struct fixed_elements {
 
 template <class T, class A>
 struct converter<std::vector<T, A>> {
+    using parts = detail::types<T>;
     static void write(json_writer& w, const std::vector<T, A>& values) {
         w.begin_array();
         for (const auto& value : values) {
@@ -106,6 +140,7 @@ struct converter<std::vector<T, A>> {
 
 template <class A>
 struct converter<std::vector<bool, A>> {
+    using parts = detail::types<bool>;
     static void write(json_writer& w, const std::vector<bool, A>& values) {
         w.begin_array();
         for (const bool value : values) {
@@ -132,6 +167,7 @@ struct converter<std::vector<bool, A>> {
 
 template <class T, std::size_t N>
 struct converter<std::array<T, N>> {
+    using parts = detail::types<T>;
     static void write(json_writer& w, const std::array<T, N>& values) {
         w.begin_array();
         for (const auto& value : values) {
@@ -158,25 +194,32 @@ struct converter<std::array<T, N>> {
     }
 };
 
-template <class T, class C, class A>
-struct converter<std::map<std::string, T, C, A>> {
-    using map = std::map<std::string, T, C, A>;
+/// Keys that are not text are written as text: {"17":...}.
+template <detail::usable_as_key Key, class T, class C, class A>
+struct converter<std::map<Key, T, C, A>> {
+    using map = std::map<Key, T, C, A>;
+    using parts = detail::types<T>;
     static void write(json_writer& w, const map& values) { detail::write_members(w, values); }
     static bool read(json_reader& r, map& values) { return detail::read_members(r, values); }
 };
 
 /// Members are written in unspecified order.
-template <class T, class H, class E, class A>
-struct converter<std::unordered_map<std::string, T, H, E, A>> {
-    using map = std::unordered_map<std::string, T, H, E, A>;
+template <detail::usable_as_key Key, class T, class H, class E, class A>
+struct converter<std::unordered_map<Key, T, H, E, A>> {
+    using map = std::unordered_map<Key, T, H, E, A>;
+    using parts = detail::types<T>;
     static void write(json_writer& w, const map& values) { detail::write_members(w, values); }
     static bool read(json_reader& r, map& values) { return detail::read_members(r, values); }
 };
 
 template <class... T>
-struct converter<std::tuple<T...>> : detail::fixed_elements<std::tuple<T...>> {};
+struct converter<std::tuple<T...>> : detail::fixed_elements<std::tuple<T...>> {
+    using parts = detail::types<T...>;
+};
 
 template <class T, class U>
-struct converter<std::pair<T, U>> : detail::fixed_elements<std::pair<T, U>> {};
+struct converter<std::pair<T, U>> : detail::fixed_elements<std::pair<T, U>> {
+    using parts = detail::types<T, U>;
+};
 
 } // namespace cles

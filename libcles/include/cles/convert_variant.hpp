@@ -25,6 +25,7 @@ struct converter<std::monostate> {
 template <class... T>
 struct converter<std::variant<T...>> {
     using variant = std::variant<T...>;
+    using parts = detail::types<T...>;
 
     static void write(json_writer& w, const variant& value) {
         std::visit([&w](const auto& held) { cles::write_json(w, held); }, value);

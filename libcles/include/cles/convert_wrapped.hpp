@@ -3,6 +3,7 @@
 
 #include <cles/convert.hpp>
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,9 @@
 #include <variant>
 
 /// Scalars are sent as {"value":x}, and unwrapped when read. Not for applications.
+///
+/// An object {"value":x} is sent as {"value":{"value":x}} if the type would otherwise be read from `x`, as a variant of
+/// a number and a struct with the number `value`.
 
 namespace cles::detail {
 
@@ -36,6 +40,57 @@ template <class T>
 inline constexpr bool comes_wrapped<std::optional<T>> = true; // as null
 template <class... T>
 inline constexpr bool comes_wrapped<std::variant<T...>> = (comes_wrapped<T> || ...);
+
+/// If the text is {"value":x}, and `x` is a scalar or again such an object: how many of them enclose the scalar.
+/// Otherwise 0.
+std::size_t levels_around_scalar(std::string_view json, std::string_view& scalar);
+
+/// Whether a T can be read from a scalar.
+template <class T>
+struct from_scalar {
+    static bool reads(std::string_view scalar) {
+        if constexpr (described_struct<T> || has_parts<T> || !readable<T> || !std::is_default_constructible_v<T>) {
+            return false;
+        } else {
+            T value{};
+            return cles::from_json(scalar, value);
+        }
+    }
+};
+template <class T>
+struct from_scalar<std::optional<T>> {
+    static bool reads(std::string_view scalar) { return scalar == "null" || from_scalar<T>::reads(scalar); }
+};
+template <class... T>
+struct from_scalar<std::variant<T...>> {
+    static bool reads(std::string_view scalar) { return (from_scalar<T>::reads(scalar) || ...); }
+};
+
+/// Writes a result, an update or what becomes a body: all that is sent. The node wraps scalars.
+template <class T>
+void write_content(json_writer& w, const T& value) {
+    cles::write_json(w, value);
+    if constexpr (comes_wrapped<T> && !is_scalar<T>) {
+        std::string_view scalar;
+        if (levels_around_scalar(w.written(), scalar) != 0 && from_scalar<T>::reads(scalar)) {
+            w.enclose("{\"value\":", "}");
+        }
+    }
+}
+
+/// As `to_json`, for what is sent.
+template <class T>
+std::string to_content(const T& value) {
+    if constexpr (comes_wrapped<T> && !is_scalar<T>) {
+        std::string out;
+        json_writer writer{out};
+        detail::write_content(writer, value);
+        detail::require_readable(writer);
+        return out;
+    } else {
+        return cles::to_json(value);
+    }
+}
 
 } // namespace cles::detail
 
@@ -79,18 +134,19 @@ struct converter<detail::wrapped<T>> {
         return r.ok();
     }
 
-    // Only scalars are wrapped. So an object whose member `value` is not a scalar is read as it is.
+    // Only scalars are wrapped, and objects that look as if they were. So any other object with a member `value` is
+    // read as it is.
     static bool read_either(json_reader& r, detail::wrapped<T>& out) {
         std::string_view raw;
         if (!r.read_raw(raw)) {
             return false;
         }
-        json_reader scalar{raw, std::string_view::npos}; // its depth has been checked
-        if (scalar.peek() == json_reader::kind::object && scalar.begin_object()) {
+        std::string_view scalar;
+        const auto levels = detail::levels_around_scalar(raw, scalar);
+        if (levels == 1 || (levels > 1 && detail::from_scalar<T>::reads(scalar))) {
+            json_reader part{raw, std::string_view::npos}; // its depth has been checked
             std::string_view key;
-            if (scalar.next_key(key) && key == "value" && scalar.peek() != json_reader::kind::object &&
-                scalar.peek() != json_reader::kind::array && cles::read_json(scalar, out.value) &&
-                !scalar.next_key(key) && scalar.ok()) {
+            if (part.begin_object() && part.next_key(key) && cles::read_json(part, out.value)) {
                 return true;
             }
         }
@@ -105,20 +161,11 @@ namespace cles::detail {
 /// Writes a value as the body of a message.
 template <class T>
 std::string to_body(const T& value) {
-    if constexpr (!is_scalar<T> && !comes_wrapped<T> && !std::is_convertible_v<const T&, std::string_view>) {
-        return cles::to_json(value);
-    } else {
-        constexpr std::string_view head = "{\"value\":";
-        std::string out{head};
-        json_writer writer{out};
-        cles::write_json(writer, value);
-        require_readable(writer);
-        if (out[head.size()] == '{' || out[head.size()] == '[') {
-            return out.substr(head.size());
-        }
-        out.push_back('}');
-        return out;
+    auto json = detail::to_content(value);
+    if (!json.starts_with('{') && !json.starts_with('[')) {
+        json.insert(0, "{\"value\":").push_back('}');
     }
+    return json;
 }
 
 } // namespace cles::detail

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/text_list.hpp>
+
 #include <functional>
 #include <string>
-#include <vector>
 
 /// Joins pools through NATS (docs/federation.md). Link the CMake target cles::federation.
 
@@ -19,7 +20,7 @@ struct node_options;
 
 struct federation_options {
     /// URLs of NATS servers, `nats://host:4222` or `tls://host:4222`: of one server, or of several of one cluster.
-    std::vector<std::string> servers;
+    text_list servers;
     /// The name of the service's pool: 1 to 32 letters, digits, '_', '-'.
     std::string pool;
     /// A file with the JWT and the key of a user of NATS; empty: none.

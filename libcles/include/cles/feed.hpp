@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/call_shape.hpp>
 #include <cles/cancellation.hpp>
 #include <cles/completion.hpp>
 #include <cles/feed_event.hpp>
@@ -307,7 +308,9 @@ class feed {
     /// or on Asio's system executor if the feed was never bound.
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_next(Token&& token = {}) {
-        if constexpr (detail::is_default_token<Token>) {
+        if constexpr (!detail::fits_token<Token, feed_item<T>>()) {
+            return detail::refuse_call<Token, feed_item<T>>();
+        } else if constexpr (detail::is_default_token<Token>) {
             return detail::next_coroutine<T>::run(owner_.source());
         } else {
             return boost::asio::async_initiate<Token, detail::signature_for<Token, feed_item<T>>>(

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <string>
-#include <vector>
+#include <cles/text_list.hpp>
 
 namespace cles {
 
@@ -15,17 +14,17 @@ struct gossip_options {
     /// URLs of nodes that are asked for other nodes, so that nodes find each other without multicast, and beyond its
     /// reach. Addresses are better than host names, which have to be resolved. A node that is a seed of others needs
     /// none.
-    std::vector<std::string> seeds{};
+    text_list seeds{};
     /// The names of the only nodes that this one may have links to, 16 at most; empty: all. Others that gossip respect
     /// it: they learn it from this node's announcements. A URL that is configured for a node is used all the same.
     /// Requests for nodes further away, and from them, pass through nodes that route (docs/protocol.md, "Routes").
-    std::vector<std::string> links{};
+    text_list links{};
     /// Set by `cles::gossip`. Seeds without it are refused with `invalid_option`.
     const detail::gossip_part* part = nullptr;
 };
 
 /// Returns options for `service_options::gossip` that enable gossip. Only programs that call this function link its
 /// code.
-gossip_options gossip(std::vector<std::string> seeds = {}, std::vector<std::string> links = {});
+gossip_options gossip(text_list seeds = {}, text_list links = {});
 
 } // namespace cles

@@ -4,10 +4,13 @@
 #include <cles/convert.hpp>
 #include <cles/request.hpp>
 #include <cles/responder.hpp>
+#include <cles/verb.hpp>
 
 #include <cstddef>
+#include <string>
 #include <tuple>
 #include <type_traits>
+#include <vector>
 
 /// Arguments and results of handlers, with readable compiler errors for unsuitable ones. Not for applications.
 
@@ -49,6 +52,9 @@ struct awaited<boost::asio::awaitable<T, E>> {
     using type = T;
 };
 
+/// Requests of these verbs have no body.
+constexpr bool has_body(verb v) noexcept { return v != verb::pull && v != verb::bind; }
+
 /// The form of a handler: (), (request), (body), (request, body) or (request, responder).
 template <class F>
 struct handler_shape {
@@ -70,6 +76,8 @@ struct handler_shape {
     static constexpr bool takes_request = takes<0, request>();
     static constexpr bool takes_responder = arity == 2 && takes<1, responder>();
     static constexpr bool takes_body = arity > (takes_request ? 1 : 0) && !takes_responder;
+    /// Whether what it takes as its body can be the parameters of a request without one.
+    static constexpr bool takes_texts = takes_body && takes<arity - 1, std::vector<std::string>>();
     static constexpr bool is_coroutine = awaited<result>::is_awaitable;
 };
 
@@ -116,7 +124,8 @@ constexpr bool fits_body() {
     constexpr bool dangles = shape::is_coroutine && std::is_reference_v<argument>;
     constexpr bool readable_body = readable<body>;
     constexpr bool made_first = std::is_default_constructible_v<body>;
-    static_assert(!dangles, "a coroutine takes its body by value: a reference would dangle once it waits");
+    static_assert(!dangles, "a coroutine takes its body by value, or its parameters: a reference would dangle once it "
+                            "waits");
     static_assert(readable_body, "the handler's argument cannot be read from JSON: describe a struct with "
                                  "BOOST_DESCRIBE_STRUCT, an enum with BOOST_DESCRIBE_ENUM, or specialise "
                                  "cles::converter (see <cles/convert.hpp>)");
@@ -125,8 +134,20 @@ constexpr bool fits_body() {
     return !dangles && readable_body && made_first;
 }
 
-/// False, with a compiler error, if a function object cannot be a handler.
-template <class F>
+/// False, with a compiler error, if a request of this verb never has what a handler takes, or never gets its result.
+template <verb Verb, class F>
+constexpr bool fits_verb() {
+    using shape = handler_shape<F>;
+    constexpr bool has_its_body = !shape::takes_body || shape::takes_texts || has_body(Verb);
+    constexpr bool decides_at_once = Verb != verb::bind || (!shape::takes_responder && !shape::is_coroutine);
+    static_assert(has_its_body, "PULL and BIND have no body: their handler takes their parameters, as "
+                                "std::vector<std::string> or from a const cles::request&");
+    static_assert(decides_at_once, "a BIND handler must be a plain function, because it decides at once");
+    return has_its_body && decides_at_once;
+}
+
+/// False, with a compiler error, if a function object cannot be a handler of this verb.
+template <verb Verb, class F>
 constexpr bool fits_handler() {
     if constexpr (one_signature<F>) {
         using shape = handler_shape<F>;
@@ -139,7 +160,7 @@ constexpr bool fits_handler() {
                 return (lends_mutable<A> || ...);
             }(static_cast<typename shape::arguments*>(nullptr));
             static_assert(!lends, "a handler takes its arguments by value or by reference to const");
-            if constexpr (lends) {
+            if constexpr (lends || !fits_verb<Verb, F>()) {
                 return false;
             } else if constexpr (shape::takes_responder && shape::is_coroutine) {
                 using result = typename awaited<typename shape::result>::type;

@@ -76,6 +76,7 @@ class json_reader {
         return at_ < text_.size() ? text_[at_] : '\0';
     }
     [[gnu::cold]] bool expected(std::string_view what);
+    [[gnu::cold]] bool expected_word(std::string_view word);
     bool require(kind wanted);
     bool enter();
     [[gnu::cold]] bool fail_too_deep();

@@ -14,9 +14,9 @@ namespace cles {
 /// Appends JSON (RFC 8259) without white space to a borrowed string.
 ///
 /// Commas and colons are added automatically: call `key` before each member of an object, and write one value after it.
-/// Doubles are written with the fewest digits that round-trip (`45.1`); a double that is not finite becomes `null`,
-/// because JSON cannot express it. In text that is not UTF-8, invalid bytes become U+FFFD, so the output is always
-/// valid. Not thread-safe; the string must outlive the writer.
+/// Floating-point numbers are written with the fewest digits that round-trip (`45.1`), those of a `float` as a `float`;
+/// one that is not finite becomes `null`, because JSON cannot express it. In text that is not UTF-8, invalid bytes
+/// become U+FFFD, so the output is always valid. Not thread-safe; the string must outlive the writer.
 ///
 /// What readers refuse is not written: beyond the depth that they accept, `begin_object` and `begin_array` throw, which
 /// also ends the recursion of a value that contains itself.
@@ -44,6 +44,7 @@ class json_writer {
     void null();
     void value(bool b);
     void value(double d);
+    void value(float f);
     void value(std::int64_t i);
     void value(std::uint64_t u);
     void value(std::string_view text);
@@ -51,6 +52,8 @@ class json_writer {
     void raw(std::string_view json);
     /// As `raw`, for text that has been checked, which is not checked again.
     void checked(std::string_view json);
+    /// Puts text around all that was written. The whole is checked before it is sent.
+    void enclose(std::string_view before, std::string_view after);
 
     /// The position in `written` where text that is not UTF-8 was first replaced; `npos` if there was none.
     [[nodiscard]] std::size_t broken_text() const noexcept { return broken_; }

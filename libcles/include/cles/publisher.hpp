@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/convert.hpp>
+#include <cles/convert_wrapped.hpp>
 
 #include <memory>
 #include <string>
@@ -36,7 +36,7 @@ class publisher {
     /// \throws cles::error with `conversion` if it cannot be written as JSON, for example text that is not UTF-8
     template <class T>
     void update(std::string_view noun, const T& value) const {
-        to_->publish(noun, cles::to_json(value));
+        to_->publish(noun, detail::to_content(value));
     }
 
   private:

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace cles {
 
@@ -62,6 +63,19 @@ decltype(auto) invoke_handler(F& f, const request& r) {
     }
 }
 
+/// Makes a handler that takes the parameters of a request one that takes the request.
+template <class F>
+auto read_parameters(F f) {
+    return [f = std::move(f)](const request& r) mutable {
+        std::vector<std::string> parameters(r.parameters().begin(), r.parameters().end());
+        if constexpr (handler_shape<F>::takes_request) {
+            return f(r, std::move(parameters));
+        } else {
+            return f(std::move(parameters));
+        }
+    };
+}
+
 /// Runs handlers that are coroutines; defined in `<cles/coroutine_handler.hpp>`, which `<cles/service.hpp>` includes.
 template <class F>
 struct coroutine_handler;
@@ -102,7 +116,7 @@ void set_handler(handler_functions& to, F f) {
             [f = std::move(f)](const request& r, json_writer&) mutable { detail::invoke_handler(f, r); });
     } else {
         to.plain = detail::copyable([f = std::move(f)](const request& r, json_writer& w) mutable {
-            cles::write_json(w, detail::invoke_handler(f, r));
+            detail::write_content(w, detail::invoke_handler(f, r));
         });
     }
 }
@@ -113,12 +127,13 @@ void set_handler(handler_functions& to, F f) {
 /// plugin and by tests, so one `void register_tasks(cles::registrar&)` works for all three.
 ///
 /// A handler takes `()`, `(request)`, `(body)`, `(request, body)` or `(request, responder)`, where the body is any type
-/// that `<cles/convert.hpp>` reads. It returns nothing, a value that `<cles/convert.hpp>` writes, or `asio::awaitable`
-/// of either. It may be move-only. A plain function runs inline, between two lines of the link, and should be quick; a
-/// coroutine may wait (include `<cles/coroutine_handler.hpp>`, or `<cles/service.hpp>`). A handler that takes a
-/// responder replies through it; it may also be an `awaitable<void>`. If the body does not fit, the reply is
-/// `bad_request`, and the handler does not run. An exception from the handler becomes the reply: a `cles::error` with
-/// its code, anything else `failed`.
+/// that `<cles/convert.hpp>` reads. PULL and BIND have no body: there a `std::vector<std::string>` in its place is the
+/// request's parameters, and other types do not compile. It returns nothing, a value that `<cles/convert.hpp>` writes,
+/// or `asio::awaitable` of either. It may be move-only. A plain function runs inline, between two lines of the link,
+/// and should be quick; a coroutine may wait (include `<cles/coroutine_handler.hpp>`, or `<cles/service.hpp>`). A
+/// handler that takes a responder replies through it; it may also be an `awaitable<void>`. If the body does not fit,
+/// the reply is `bad_request`, and the handler does not run. An exception from the handler becomes the reply: a
+/// `cles::error` with its code, anything else `failed`.
 ///
 /// In a plugin, handlers (including those of BIND) run on threads of a pool, several at a time, unless the task is
 /// `inline_ok`. Coroutines are refused there, because they need the executor of an application.
@@ -137,21 +152,21 @@ class registrar {
 
     template <class F>
     void on_pull(std::string_view task, F handler, task_info info = {}) {
-        add_handler(verb::pull, task, std::move(handler), info);
+        add_handler<verb::pull>(task, std::move(handler), info);
     }
     template <class F>
     void on_push(std::string_view task, F handler, task_info info = {}) {
-        add_handler(verb::push, task, std::move(handler), info);
+        add_handler<verb::push>(task, std::move(handler), info);
     }
     template <class F>
     void on_delegate(std::string_view task, F handler, task_info info = {}) {
-        add_handler(verb::delegate, task, std::move(handler), info);
+        add_handler<verb::delegate>(task, std::move(handler), info);
     }
     /// Runs when a node asks this one to publish (an UPDATE request); the body is published afterwards. Also opens the
     /// task for BIND.
     template <class F>
     void on_update(std::string_view task, F handler, task_info info = {}) {
-        add_handler(verb::update, task, std::move(handler), info);
+        add_handler<verb::update>(task, std::move(handler), info);
     }
     /// Opens a task for BIND before its first update.
     void on_bind(std::string_view task, task_info info = {});
@@ -159,24 +174,23 @@ class registrar {
     /// of an unknown parameter. Its return value is ignored.
     template <class F>
     void on_bind(std::string_view task, F handler, task_info info = {}) {
-        if constexpr (detail::one_signature<F>) {
-            using shape = detail::handler_shape<F>;
-            static_assert(!shape::takes_responder && !shape::is_coroutine,
-                          "a BIND handler must be a plain function, because it decides at once");
-        }
-        add_handler(verb::bind, task, std::move(handler), info);
+        add_handler<verb::bind>(task, std::move(handler), info);
     }
 
   private:
     /// Registers a task; takes `info` and `functions`.
     void add_task(cles::verb verb, std::string_view task, task_info& info, detail::handler_functions& functions);
 
-    template <class F>
-    void add_handler(cles::verb verb, std::string_view task, F handler, task_info& info) {
-        if constexpr (detail::fits_handler<F>()) {
+    template <cles::verb Verb, class F>
+    void add_handler(std::string_view task, F handler, task_info& info) {
+        if constexpr (detail::fits_handler<Verb, F>()) {
             detail::handler_functions functions;
-            detail::set_handler(functions, std::move(handler));
-            add_task(verb, task, info, functions);
+            if constexpr (!detail::has_body(Verb) && detail::handler_shape<F>::takes_texts) {
+                detail::set_handler(functions, detail::read_parameters(std::move(handler)));
+            } else {
+                detail::set_handler(functions, std::move(handler));
+            }
+            add_task(Verb, task, info, functions);
         }
     }
 };

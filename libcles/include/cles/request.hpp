@@ -110,16 +110,20 @@ class request {
     /// \throws cles::error with `bad_request`, naming the path to the part that does not fit
     template <class T>
     [[nodiscard]] T as() const {
-        using carrier = std::conditional_t<detail::comes_wrapped<T>, detail::wrapped<T>, T>;
-        carrier value{};
-        std::string why;
-        if (!cles::from_json(body(), value, &why)) {
-            detail::throw_bad_body(why);
-        }
-        if constexpr (detail::comes_wrapped<T>) {
-            return std::move(value.value);
-        } else {
-            return value;
+        constexpr bool made_first = std::is_default_constructible_v<T>;
+        static_assert(made_first, "the type of a body needs a default constructor: it is made first, and then read");
+        if constexpr (made_first) {
+            using carrier = std::conditional_t<detail::comes_wrapped<T>, detail::wrapped<T>, T>;
+            carrier value{};
+            std::string why;
+            if (!cles::from_json(body(), value, &why)) {
+                detail::throw_bad_body(why);
+            }
+            if constexpr (detail::comes_wrapped<T>) {
+                return std::move(value.value);
+            } else {
+                return value;
+            }
         }
     }
 

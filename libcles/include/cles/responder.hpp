@@ -4,6 +4,7 @@
 #include <cles/call_options.hpp>
 #include <cles/chrono.hpp>
 #include <cles/convert.hpp>
+#include <cles/convert_wrapped.hpp>
 #include <cles/error.hpp>
 #include <cles/log.hpp>
 
@@ -76,7 +77,7 @@ class responder {
     void done(const T& result) const {
         std::string json;
         try {
-            json = cles::to_json(result);
+            json = detail::to_content(result);
         } catch (...) {
             detail::fail_with(*call_, std::current_exception());
             return;

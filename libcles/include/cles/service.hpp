@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/call_options.hpp>
+#include <cles/call_shape.hpp>
 #include <cles/cancellation.hpp>
 #include <cles/chrono.hpp>
 #include <cles/convert.hpp>
@@ -13,6 +14,7 @@
 #include <cles/limits.hpp>
 #include <cles/log.hpp>
 #include <cles/multicast.hpp>
+#include <cles/parameter.hpp>
 #include <cles/peer.hpp>
 #include <cles/pending.hpp>
 #include <cles/registrar.hpp>
@@ -20,6 +22,7 @@
 #include <cles/routing.hpp>
 #include <cles/short_text.hpp>
 #include <cles/standard.hpp>
+#include <cles/text_list.hpp>
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/associated_cancellation_slot.hpp>
@@ -88,17 +91,17 @@ struct converter<Urls> : converter<typename Urls::map> {}; // a template: conver
 
 /// The configuration of a service. Only the name is required.
 struct service_options {
-    std::string name{};                ///< 1 to 64 letters, digits, '_', '-', '.'; not self, any, all
-    std::vector<std::string> listen{}; ///< link URLs, see docs/links.md; none: it does not listen
-    peer_urls peers{};                 ///< URLs of other nodes, by name
-    bool insecure = false;             ///< allow listening beyond this host without credentials
+    std::string name{};    ///< 1 to 64 letters, digits, '_', '-', '.'; not self, any, all
+    text_list listen{};    ///< link URLs, see docs/links.md; none: it does not listen
+    peer_urls peers{};     ///< URLs of other nodes, by name
+    bool insecure = false; ///< allow listening beyond this host without credentials
     /// `cles::secured(directory)` authenticates all peers and encrypts what is sent to other hosts
     /// (<cles/security.hpp>, docs/security.md). Each service needs its own.
     detail::service_part security{};
     /// Networks ("10.0.0.0/8", "fd00::/8") whose source addresses are trusted, so the amount sent to them by UDP is not
     /// limited. All other hosts except loopback are sent less than 64 KiB a second, so that the node cannot be used to
     /// flood a third party.
-    std::vector<std::string> networks{};
+    text_list networks{};
     /// Multicast. Beyond loopback only if `insecure` is set too.
     multicast_options multicast{};
     /// `cles::gossip({seeds})` finds other nodes by gossip, without multicast and beyond its reach.
@@ -321,7 +324,9 @@ class service : public registrar {
     /// Cancellation ends the wait, but new requests are still not started.
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_close(std::chrono::milliseconds limit, Token&& token = {}) {
-        if constexpr (detail::is_default_token<Token>) {
+        if constexpr (!detail::fits_token<Token>()) {
+            return detail::refuse_call<Token, void>();
+        } else if constexpr (detail::is_default_token<Token>) {
             return await_close(limit);
         } else {
             return initiate_plain(&service::start_close, std::forward<Token>(token), limit);
@@ -348,7 +353,7 @@ class service : public registrar {
     /// `conversion` (text that is not UTF-8, brackets nested deeper than 35 levels)
     template <class T>
     void update(std::string_view noun, const T& value) {
-        publish(noun, [&](json_writer& w) { cles::write_json(w, value); });
+        publish(noun, [&](json_writer& w) { detail::write_content(w, value); });
     }
 
     /// Forgets the last value of a noun; later subscribers receive `{}`. Existing subscribers stay bound, and still
@@ -365,11 +370,13 @@ class service : public registrar {
     /// published.
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
-        if constexpr (detail::is_default_token<Token>) {
-            return await_update(std::string{noun}, converted([&] { return cles::to_json(value); }));
+        if constexpr (!detail::fits_token<Token>()) {
+            return detail::refuse_call<Token, void>();
+        } else if constexpr (detail::is_default_token<Token>) {
+            return await_update(std::string{noun}, converted([&] { return detail::to_content(value); }));
         } else {
             return initiate_plain(&service::start_update, std::forward<Token>(token), std::string{noun},
-                                  converted([&] { return cles::to_json(value); }));
+                                  converted([&] { return detail::to_content(value); }));
         }
     }
 
@@ -446,7 +453,11 @@ class service : public registrar {
     }
     template <class T = json_text, class Token = boost::asio::use_awaitable_t<>>
     auto async_bind(std::string_view noun, const bind_options& options, Token&& token = {}) {
-        if constexpr (detail::is_default_token<Token>) {
+        if constexpr (!detail::fits_answer<T>()) {
+            return detail::refuse_call<Token, feed<json_text>>();
+        } else if constexpr (!detail::fits_token<Token, feed<T>>()) {
+            return detail::refuse_call<Token, feed<T>>();
+        } else if constexpr (detail::is_default_token<Token>) {
             return detail::bind_coroutine<T>::run(*this, std::string{noun}, options);
         } else {
             return boost::asio::async_initiate<Token, detail::signature_for<Token, feed<T>>>(
@@ -497,7 +508,9 @@ class service : public registrar {
     template <class T, class Token, class Options>
     auto initiate(detail::request_kind kind, std::string_view noun, detail::outgoing_body body, const Options& options,
                   Token&& token) {
-        if constexpr (detail::is_default_token<Token>) {
+        if constexpr (!detail::fits_call<Token, T>()) {
+            return detail::refuse_call<Token, T>();
+        } else if constexpr (detail::is_default_token<Token>) {
             return detail::reply_coroutine<T, Options>::run(*this, kind, detail::short_text{noun}, std::move(body),
                                                             options);
         } else {

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/text_list.hpp>
+
 #include <string>
-#include <vector>
 
 namespace cles {
 
 /// The description of a task; shown by `PULL node:cles` and the `cles info` command.
 struct task_info {
     std::string description{};
-    std::vector<std::string> parameters{}; ///< their names, in order
-    bool idempotent = false;               ///< running it twice has the same effect as once
-    bool inline_ok = false;                ///< in the runtime: quick enough to run on the I/O thread
+    text_list parameters{};  ///< their names, in order
+    bool idempotent = false; ///< running it twice has the same effect as once
+    bool inline_ok = false;  ///< in the runtime: quick enough to run on the I/O thread
     /// Its jobs are not moved to other nodes, because they need the state, files or devices of this one
     /// (docs/sharing.md).
     bool local = false;

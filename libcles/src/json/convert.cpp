@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/convert.hpp>
 
+#include "json/json_scan.hpp"
+
 #include <boost/container/small_vector.hpp>
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -61,6 +64,61 @@ std::string path_to(std::string_view json, std::size_t at) {
     return path;
 }
 
+// -- enums --
+
+// The last enumerator of that value, whose name is not empty.
+std::string_view enumerator_of(const enum_values& known, std::uint64_t value) noexcept {
+    for (auto i = known.values.size(); i-- > 0;) {
+        if (known.values[i] == value) {
+            return known.names[i];
+        }
+    }
+    return {};
+}
+
+bool find_value(const enum_values& known, std::string_view name, std::uint64_t& value) noexcept {
+    const auto at = static_cast<std::size_t>(std::ranges::find(known.names, name) - known.names.begin());
+    if (at == known.names.size()) {
+        return false;
+    }
+    value = known.values[at];
+    return true;
+}
+
+// Whether flags are combined. No reader takes negative numbers.
+bool combines_flags(const enum_values& known, std::uint64_t value) noexcept {
+    if (!known.has_union || (known.is_signed && static_cast<std::int64_t>(value) < 0)) {
+        return false;
+    }
+    std::uint64_t contained = 0;
+    for (const auto each : known.values) {
+        contained |= (each & ~value) == 0 ? each : 0;
+    }
+    return contained == value;
+}
+
+std::string choices_of(const enum_values& known) {
+    std::string choices;
+    for (const auto choice : known.names) {
+        choices.append(choices.empty() ? "" : ", ").append(choice);
+    }
+    return choices;
+}
+
+std::string text_of(const enum_values& known, std::uint64_t value) {
+    return known.is_signed ? std::to_string(static_cast<std::int64_t>(value)) : std::to_string(value);
+}
+
+std::string nameless(const enum_values& known, std::uint64_t value) {
+    return text_of(known, value) + " is none of " + choices_of(known);
+}
+
+// Only the text that is written for a number stands for it, so that no key has two texts.
+template <class Number>
+bool read_canonical(std::string_view text, Number& number) {
+    return json_detail::read_number(text, number) && std::to_string(number) == text;
+}
+
 } // namespace
 
 void check_written(const json_writer& w) {
@@ -80,6 +138,21 @@ void check_written(const json_writer& w) {
 void write_array(json_writer& w, const char* text, std::size_t size) {
     const std::string_view whole{text, size};
     w.value(whole.substr(0, whole.find('\0')));
+}
+
+namespace {
+
+std::string range_text(double minimum, double maximum) {
+    return "a number outside of its range, " + to_json(minimum) + " to " + to_json(maximum);
+}
+
+} // namespace
+
+bool fail_range(json_reader& r, double minimum, double maximum) { return r.fail(range_text(minimum, maximum)); }
+
+void throw_range(const json_writer& w, double minimum, double maximum) {
+    const auto path = path_to(w.written(), w.written().size());
+    throw error(errc::conversion, path + ": " + range_text(minimum, maximum));
 }
 
 double require_finite(double number, bool was_finite, std::string_view why) {
@@ -133,20 +206,69 @@ bool read_fields(json_reader& r, void* object, std::span<const field> fields) {
     return true;
 }
 
-bool read_choice(json_reader& r, std::span<const std::string_view> names, std::size_t& index) {
+void write_enum(json_writer& w, const enum_values& known, std::uint64_t value) {
+    if (const auto name = enumerator_of(known, value); !name.empty()) {
+        w.value(name);
+    } else if (!combines_flags(known, value)) {
+        const auto path = path_to(w.written(), w.written().size());
+        throw error(errc::conversion, path + (path.empty() ? "" : ": ") + nameless(known, value));
+    } else if (known.is_signed) {
+        w.value(static_cast<std::int64_t>(value));
+    } else {
+        w.value(value);
+    }
+}
+
+bool read_enum(json_reader& r, const enum_values& known, std::uint64_t& value) {
+    if (r.peek() == json_reader::kind::number && known.has_union) {
+        return r.read(value) && (combines_flags(known, value) || r.fail("a number that combines no flags"));
+    }
     std::string_view name;
-    if (!r.read(name)) {
-        return false;
+    return r.read(name) && (find_value(known, name, value) || r.fail("expected one of " + choices_of(known)));
+}
+
+std::string enum_key(const enum_values& known, std::uint64_t value) {
+    if (const auto name = enumerator_of(known, value); !name.empty()) {
+        return std::string{name};
     }
-    index = static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
-    if (index != names.size()) {
-        return true;
+    if (!combines_flags(known, value)) {
+        throw error(errc::conversion, nameless(known, value));
     }
-    std::string choices;
-    for (const auto choice : names) {
-        choices.append(choices.empty() ? "" : ", ").append(choice);
+    return text_of(known, value);
+}
+
+bool read_enum_key(json_reader& r, std::string_view key, const enum_values& known, std::uint64_t& value) {
+    return find_value(known, key, value) ||
+           (read_canonical(key, value) && enumerator_of(known, value).empty() && combines_flags(known, value)) ||
+           r.fail("the key is not one of " + choices_of(known));
+}
+
+bool read_integer_key(json_reader& r, std::string_view text, std::int64_t& key) {
+    return read_canonical(text, key) || r.fail("the key is not an integer");
+}
+
+bool read_integer_key(json_reader& r, std::string_view text, std::uint64_t& key) {
+    return read_canonical(text, key) || r.fail("the key is not an integer of 0 or more");
+}
+
+std::size_t levels_around_scalar(std::string_view json, std::string_view& scalar) {
+    json_reader r{json, std::string_view::npos}; // its depth has been checked, or is when it is sent
+    std::size_t levels = 0;
+    std::string_view key;
+    for (; r.peek() == json_reader::kind::object; ++levels) {
+        if (!r.begin_object() || !r.next_key(key) || key != "value") {
+            return 0;
+        }
     }
-    return r.fail("expected one of " + choices);
+    if (levels == 0 || r.peek() == json_reader::kind::array || !r.read_raw(scalar)) {
+        return 0;
+    }
+    for (auto open = levels; open != 0; --open) {
+        if (r.next_key(key)) {
+            return 0;
+        }
+    }
+    return r.at_end() ? levels : 0;
 }
 
 void write_text(json_writer& w, std::string_view json) {

@@ -58,7 +58,7 @@ void write_member(json_writer& w, std::string_view name, const T& value) {
     w.plain_key(name);
     if constexpr (std::is_convertible_v<const T&, std::string_view>) {
         w.value(std::string_view{value});
-    } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+    } else if constexpr (std::is_base_of_v<std::vector<std::string>, T>) {
         w.begin_array();
         for (const auto& each : value) {
             w.value(std::string_view{each});

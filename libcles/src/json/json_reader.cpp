@@ -54,6 +54,17 @@ bool json_reader::expected(std::string_view what) {
     return fail(text);
 }
 
+// A word that begins as `null`, `true` or `false` do is another one.
+bool json_reader::expected_word(std::string_view word) {
+    constexpr std::size_t longest = 16;
+    const auto rest = text_.substr(at_, longest);
+    std::size_t length = 0;
+    while (length < rest.size() && (json_detail::is_letter(rest[length]) || json_detail::is_digit(rest[length]))) {
+        ++length;
+    }
+    return fail("expected " + std::string{word} + ", got '" + std::string{rest.substr(0, length)} + "'");
+}
+
 void json_reader::inside_member(std::string_view name) {
     if (!path_.empty() && path_.front() != '[') {
         path_.insert(0, ".");
@@ -169,7 +180,7 @@ bool json_reader::next_element() { return next(']'); }
 
 bool json_reader::literal(std::string_view word) {
     if (text_.substr(at_, word.size()) != word) {
-        return expected(word);
+        return expected_word(word);
     }
     at_ += word.size();
     return true;

@@ -45,6 +45,8 @@ inline std::size_t plain_end(std::string_view text, std::size_t at) noexcept {
 /// As in the grammars of JSON and of the protocol: ASCII, whatever the locale.
 constexpr bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
 
+constexpr bool is_letter(char c) noexcept { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+
 /// The length of the well-formed UTF-8 sequence (Unicode 15, table 3-7) that starts at `at`, or 0.
 std::size_t utf8_sequence(std::string_view text, std::size_t at) noexcept;
 

@@ -139,6 +139,15 @@ void json_writer::value(double d) {
     }
 }
 
+void json_writer::value(float f) {
+    if (!std::isfinite(f)) {
+        null();
+        return;
+    }
+    separate();
+    json_detail::append_number(out_, f);
+}
+
 void json_writer::value(std::int64_t i) {
     separate();
     json_detail::append_number(out_, i);
@@ -162,6 +171,13 @@ void json_writer::raw(std::string_view json) {
 void json_writer::checked(std::string_view json) {
     separate();
     out_.append(json);
+}
+
+void json_writer::enclose(std::string_view before, std::string_view after) {
+    has_raw_ = true;
+    out_.insert(start_, before);
+    out_.append(after);
+    broken_ += broken_ == npos ? 0 : before.size();
 }
 
 } // namespace cles

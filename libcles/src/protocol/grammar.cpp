@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/grammar.hpp"
 
+#include <cles/error.hpp>
+#include <cles/parameter.hpp>
 #include <cles/printable.hpp>
 
 #include "json/json_scan.hpp"
@@ -212,3 +214,16 @@ std::optional<std::uint64_t> number_between(std::string_view text, std::uint64_t
 }
 
 } // namespace cles::protocol
+
+namespace cles {
+
+std::string encode_parameter(std::string_view text) {
+    std::string encoded;
+    protocol::encode_parameter(text, encoded);
+    if (!protocol::is_parameter(encoded)) {
+        throw error(errc::invalid_name, "a parameter is UTF-8 text without control characters, and not empty");
+    }
+    return encoded;
+}
+
+} // namespace cles

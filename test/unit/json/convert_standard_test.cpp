@@ -39,6 +39,11 @@ struct reading {
 };
 BOOST_DESCRIBE_STRUCT(reading, (), (value))
 
+struct outer {
+    reading value;
+};
+BOOST_DESCRIBE_STRUCT(outer, (), (value))
+
 struct stamped {
     std::int64_t utc = 7;
     double quality = 0.5;
@@ -204,6 +209,11 @@ BOOST_AUTO_TEST_CASE(a_floating_point_duration_out_of_range_is_an_error) {
     BOOST_TEST((from_json<chrono::duration<float, std::milli>>("1.5").count() == 1500.0F));
 }
 
+BOOST_AUTO_TEST_CASE(a_duration_may_count_characters) {
+    BOOST_TEST((round_trip(chrono::duration<char>{100}) == chrono::duration<char>{100}));
+    BOOST_TEST((why<chrono::duration<char>>("300") == "a time out of range"));
+}
+
 BOOST_AUTO_TEST_CASE(durations_survive_a_round_trip) {
     for (const auto count :
          {std::int64_t{0}, std::int64_t{1}, std::int64_t{-1}, std::int64_t{999'999'999}, std::int64_t{-1'000'000'001},
@@ -302,6 +312,40 @@ BOOST_AUTO_TEST_CASE(a_variant_is_the_value_that_it_holds) {
     BOOST_TEST((from_json<std::variant<int, double>>("2.5").index() == 1U));
 }
 
+// A scalar is sent as {"value":x}, which may also be an object of the type.
+BOOST_AUTO_TEST_CASE(an_object_that_looks_like_a_wrapped_scalar_survives_a_round_trip_as_body) {
+    using cles::detail::to_body;
+    using either = std::variant<reading, double>;
+    BOOST_TEST(to_body(either{5.0}) == R"({"value":5})");
+    BOOST_TEST(to_body(either{reading{5}}) == R"({"value":{"value":5}})");
+    BOOST_TEST(round_trip_as_body(either{reading{5}}).index() == 0U);
+    BOOST_TEST(round_trip_as_body(either{5.0}).index() == 1U);
+    BOOST_TEST(round_trip_as_body(std::variant<double, reading>{reading{5}}).index() == 1U);
+    BOOST_TEST(round_trip_as_body(std::optional<either>{reading{5}})->index() == 0U);
+    // Where nothing else is read from the scalar, the object stays as it is.
+    BOOST_TEST(to_body(std::optional<reading>{reading{5}}) == R"({"value":5})");
+    BOOST_TEST(round_trip_as_body(std::optional<reading>{reading{5}})->value == 5.0);
+    BOOST_TEST(to_body(std::variant<reading, std::string>{reading{5}}) == R"({"value":5})");
+    BOOST_TEST(to_body(std::vector<either>{reading{5}, 5.0}) == R"([{"value":5},5])");
+
+    using by_name = std::map<std::string, double>;
+    using named = std::variant<by_name, double>;
+    BOOST_TEST(round_trip_as_body(named{by_name{{"value", 3}}}).index() == 0U);
+    BOOST_TEST(to_body(named{by_name{{"value", 3}, {"x", 1}}}) == R"({"value":3,"x":1})");
+    using holes = std::map<std::string, std::optional<double>>;
+    BOOST_TEST(round_trip_as_body(std::optional<holes>{holes{{"value", std::nullopt}}}).has_value());
+    BOOST_TEST(!round_trip_as_body(std::optional<holes>{}).has_value());
+
+    // What is wrapped looks like an object that a type may hold, too.
+    using deep = std::variant<outer, reading, double>;
+    BOOST_TEST(round_trip_as_body(deep{outer{reading{5}}}).index() == 0U);
+    BOOST_TEST(round_trip_as_body(deep{reading{5}}).index() == 1U);
+    BOOST_TEST(round_trip_as_body(deep{5.0}).index() == 2U);
+    // As a program without the type may send it.
+    BOOST_TEST(from_json<cles::detail::wrapped<std::optional<outer>>>(R"({"value":{"value":5}})").value->value.value ==
+               5.0);
+}
+
 BOOST_AUTO_TEST_CASE(types_that_may_be_scalars_survive_a_round_trip_as_body) {
     using cles::detail::to_body;
     BOOST_TEST(to_body(1500ms) == "{\"value\":\"PT1.5S\"}");
@@ -311,6 +355,8 @@ BOOST_AUTO_TEST_CASE(types_that_may_be_scalars_survive_a_round_trip_as_body) {
     BOOST_TEST(to_body(std::variant<double, pose>{pose{1, 2}}) == "{\"x\":1,\"y\":2}");
     BOOST_TEST(to_body(std::vector<int>{1}) == "[1]");
     BOOST_TEST(to_body("text") == "{\"value\":\"text\"}");
+    BOOST_TEST(to_body(cles::json_text{" 5"}) == "{\"value\":5}");
+    BOOST_TEST(to_body(cles::json_text{"[5]"}) == "[5]");
     BOOST_TEST((round_trip_as_body(1500ms) == 1500ms));
     BOOST_TEST((round_trip_as_body(std::optional<int>{5}) == 5));
     BOOST_TEST((!round_trip_as_body(std::optional<int>{}).has_value()));

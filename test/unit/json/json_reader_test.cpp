@@ -370,6 +370,10 @@ BOOST_AUTO_TEST_CASE(an_error_says_what_was_expected_and_what_was_found) {
     BOOST_TEST(read<std::int64_t>("\"x\"").error == "expected a number, got a string (at byte 0)");
     BOOST_TEST(read<std::string>("{}").error == "expected a string, got an object (at byte 0)");
     BOOST_TEST(read<bool>("null").error == "expected true or false, got null (at byte 0)");
+    BOOST_TEST(read<bool>("fals").error == "expected false, got 'fals' (at byte 0)");
+    BOOST_TEST(why("[nul]") == "expected null, got 'nul' (at byte 1)");
+    BOOST_TEST(why("nil") == "expected null, got 'nil' (at byte 0)");
+    BOOST_TEST(why("tru\n") == "expected true, got 'tru' (at byte 0)");
     BOOST_TEST(read<bool>("").error == "expected true or false, but the text ends (at byte 0)");
     BOOST_TEST(read<std::int64_t>("5 6").error == "more text after the value (at byte 2)");
     BOOST_TEST(why("{\"a\" 1}") == "expected ':', got a number (at byte 5)");

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/error.hpp>
+#include <cles/parameter.hpp>
+
 #include "protocol/grammar.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -194,6 +197,16 @@ BOOST_AUTO_TEST_CASE(allowed_characters_are_written_plain_and_others_as_upper_ca
         const std::string text(1, static_cast<char>(c));
         BOOST_TEST(decoded(encoded(text)) == text);
         BOOST_TEST(cles::protocol::is_parameter(encoded(text)), "'" << text << "' as " << encoded(text));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(programs_can_encode_a_parameter) {
+    BOOST_TEST(cles::encode_parameter("front-left_2.~+") == "front-left_2.~+");
+    BOOST_TEST(cles::encode_parameter("a b/c%") == "a%20b%2Fc%25");
+    BOOST_TEST(cles::encode_parameter("é") == "%C3%A9");
+    for (const std::string_view refused : {"", "a\nb", "a\x7f", "\xFF"}) {
+        BOOST_CHECK_EXCEPTION(cles::encode_parameter(refused), cles::error,
+                              [](const cles::error& e) { return e.code() == cles::errc::invalid_name; });
     }
 }
 

@@ -114,7 +114,7 @@ class gossip_driver final : private gossip::client, public gossip {
 
 namespace cles {
 
-gossip_options gossip(std::vector<std::string> seeds, std::vector<std::string> links) {
+gossip_options gossip(text_list seeds, text_list links) {
     static constexpr detail::gossip_part part{
         [](core::local_node& node, std::uint32_t seed) -> std::unique_ptr<core::gossip> {
             return std::make_unique<core::gossip_driver>(node, seed);
