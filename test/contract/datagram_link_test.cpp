@@ -375,6 +375,7 @@ class numbering_codec final : public cles::transport::datagram_codec {
             owner_->transmit(to.at, std::to_string(++sealed_) + ":" + std::string{line});
         }
     }
+    void contact(const cles::transport::datagram_origin&) override {}
     void check_peer(const cles::transport::datagram_origin&, cles::time_point) override {}
     void release(const cles::transport::datagram_origin&) override {}
     [[nodiscard]] std::string name_of(std::uint32_t member) const override { return std::to_string(member); }

@@ -4,6 +4,7 @@
 #include "support/run_until.hpp"
 #include "transport/group_port.hpp"
 #include "transport/ip_interface.hpp"
+#include "transport/udp.hpp"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/multicast.hpp>
@@ -175,7 +176,10 @@ BOOST_FIXTURE_TEST_CASE(a_line_that_cannot_be_sent_is_lost_alone, fixture) {
     member one{io, where};
     member two{io, where};
     const std::string lines = "1\n" + std::string(70'000, 'x') + "\n2\n"; // exceeds the maximum of UDP
-    BOOST_TEST(one.port->send(lines).bytes == lines.size());
+    const auto done = one.port->send(lines);
+    BOOST_TEST(done.bytes == lines.size());
+    BOOST_TEST(done.failed == 1U);
+    BOOST_TEST(done.why.value() == EMSGSIZE);
     run_until(io, [&] { return two.heard.size() == 2; });
     BOOST_TEST(two.heard == (std::vector<std::string>{"1\n", "2\n"}), boost::test_tools::per_element());
 }
@@ -240,6 +244,48 @@ BOOST_FIXTURE_TEST_CASE(members_of_one_executor_share_a_socket_and_those_of_othe
     BOOST_TEST((receiver_of(io.get_executor(), by, other_group) != receiver));
     BOOST_TEST((receiver_of(elsewhere.get_executor(), by, group) != receiver));
     BOOST_TEST((receiver_of(asio::make_strand(io), by, group) != receiver));
+}
+
+// A listener on all addresses has the port of the group, as the default of nodes with security does.
+BOOST_FIXTURE_TEST_CASE(a_listener_at_the_port_of_the_group_leaves_the_group_to_others, fixture) {
+    const cles::url all{.scheme = "udp", .host = "0.0.0.0", .port = where.port};
+    asio::io_context elsewhere;
+    const auto refused = [&] {
+        try {
+            cles::transport::listen_udp(elsewhere.get_executor(), all)->close();
+            return boost::system::error_code{};
+        } catch (const boost::system::system_error& e) {
+            return e.code();
+        }
+    };
+    const auto listener = cles::transport::listen_udp(io.get_executor(), all);
+    int links = 0;
+    listener->start([&](const cles::link_ptr&) { ++links; });
+    {
+        member one{io, where};
+        member two{elsewhere, where};
+        one.port->send("1\n");
+        run_until(elsewhere, [&] { return two.heard.size() == 1; });
+        udp::socket client{io, udp::v4()};
+        client.send_to(asio::buffer("PULL self:x", 11), {asio::ip::address_v4::loopback(), where.port});
+        run_until(io, [&] { return links != 0; });
+        io.poll();
+        BOOST_TEST(links == 1); // of the client: the group's datagrams are not for it
+        BOOST_TEST(one.heard.empty());
+        BOOST_TEST(refused() == boost::system::errc::address_in_use);
+    }
+    BOOST_TEST(refused() == boost::system::errc::address_in_use);
+    listener->close();
+    member one{io, where};
+    BOOST_TEST(!refused());
+}
+
+BOOST_FIXTURE_TEST_CASE(a_listener_at_a_free_port_leaves_the_groups_of_that_port_to_others, fixture) {
+    const auto listener =
+        cles::transport::listen_udp(io.get_executor(), {.scheme = "udp", .host = "0.0.0.0", .port = 0});
+    where.port = listener->local().port;
+    member one{io, where};
+    listener->close();
 }
 
 BOOST_FIXTURE_TEST_CASE(datagrams_go_out_with_a_TTL_of_1, fixture) {

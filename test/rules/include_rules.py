@@ -151,6 +151,9 @@ INHERITED_LAYERS = LIBRARY | {"runtime", "apps", "plugins"}
 INHERITED_OF_ASIO = re.compile(r"\basync_accept\b|\bacceptor_?\.accept\(|\.open\([^;]*(protocol\(\)|::v[46]\(\))"
                                r"|(?<!make_private<udp::socket>)[({]\w+, *(\w+::)*(udp|tcp)::v[46]\(\)")
 
+# What looks up names waits for them as long as the system does.
+LOOKUP = re.compile(r"\b(async_resolve|getaddrinfo|gethostbyname)\b|::resolver\b")
+
 # A category of errors: without an id, the one of a shared library differs from that of the program.
 CATEGORY = re.compile(r"\bclass \w+[^;{}]*:\s*public (?:boost::system::)?error_category\s*\{(?P<body>.*?)^\};", re.MULTILINE | re.DOTALL)
 CATEGORY_ID = re.compile(r":\s*error_category\(0x")
@@ -363,6 +366,10 @@ class Tree:
             for match in INHERITED_OF_ASIO.finditer(clean):
                 self.complain(name, clean.count("\n", 0, match.start()) + 1,
                               f"'{match.group(0)}': programs that are started inherit it: use transport/private_socket.hpp")
+        if layer in LIBRARY | {"runtime"} and name != "libcles/src/transport/ip_host.cpp":
+            for match in LOOKUP.finditer(clean):
+                self.complain(name, clean.count("\n", 0, match.start()) + 1,
+                              f"'{match.group(0)}': others would wait for a slow name: use transport/host_lookup.hpp")
         if layer in LIBRARY:
             for match in CATEGORY.finditer(clean):
                 if not CATEGORY_ID.search(match["body"]):
@@ -479,6 +486,8 @@ PLANTED = [
     ("libcles/src/transport/a.cpp", "void f() { socket.open(where.protocol(), code); }\n", "use transport/private_socket.hpp"),
     ("libcles/src/transport/a.cpp", "a::a() : socket_(executor, udp::v4()) {}\n", "use transport/private_socket.hpp"),
     ("libcles/src/transport/a.cpp", "void f() { acceptor_.async_accept(g); }\n", "use transport/private_socket.hpp"),
+    ("libcles/src/transport/a.cpp", "void f() { resolver_.async_resolve(g); }\n", "use transport/host_lookup.hpp"),
+    ("runtime/a.cpp", "boost::asio::ip::tcp::resolver made{io};\n", "use transport/host_lookup.hpp"),
     ("libcles/src/protocol/a.cpp", "class ours final : public boost::system::error_category {\n  public:\n    int f();\n};\n",
      "without an id"),
     ("runtime/a.cpp", "int f() { return ::socket(1, 2, 0); }\n", "close-on-exec is missing"),

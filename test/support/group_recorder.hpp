@@ -3,6 +3,8 @@
 
 #include "port/group_port.hpp"
 
+#include <boost/system/error_code.hpp>
+
 #include <memory>
 #include <string>
 #include <string_view>
@@ -24,7 +26,12 @@ class group_recorder final : public core::group_port {
         core::datagrams_done taken;
         for (; !all.empty(); all.drop_first()) {
             const auto one = all.first();
-            sent_.emplace_back(one.substr(0, one.size() - (one.ends_with('\n') ? 1 : 0)));
+            if (failure) {
+                ++taken.failed;
+                taken.why = failure;
+            } else {
+                sent_.emplace_back(one.substr(0, one.size() - (one.ends_with('\n') ? 1 : 0)));
+            }
             ++taken.count;
             taken.bytes += one.size();
         }
@@ -42,6 +49,7 @@ class group_recorder final : public core::group_port {
     [[nodiscard]] std::shared_ptr<core::group_port> share() { return {std::shared_ptr<void>{}, this}; }
 
     bool writable = true;
+    boost::system::error_code failure{}; // if set, nothing is sent
 
   private:
     core::group_source self_;

@@ -3,6 +3,8 @@
 
 #include <cles/verb.hpp>
 
+#include <boost/system/error_code.hpp>
+
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -21,6 +23,10 @@ struct identity {
 
     bool operator==(const identity&) const = default;
 };
+
+/// The category of the error of a request to a Unix socket where a user listens who is not trusted to be that node. The
+/// value is the id of the user. The codes equal `std::errc::permission_denied`.
+const boost::system::error_category& untrusted_listener_category() noexcept;
 
 /// A request whose access is to be checked.
 struct access {

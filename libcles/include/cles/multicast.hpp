@@ -14,12 +14,13 @@ namespace cles {
 /// 1, so routers do not forward them.
 struct multicast_options {
     /// Interface names: "eth0", "lo"; several separated by commas: "lo,eth0", up to `most_interfaces`; "auto": those
-    /// that `interfaces_of` returns when the service starts. Empty: no multicast.
+    /// that `interfaces_of` returns. The service follows their changes. Empty: no multicast.
     std::string interface {};
     std::string group = "239.255.25.37"; ///< an address from 224.0.0.0 to 239.255.255.255
     std::uint16_t port = 25370;          ///< not 0, because all nodes must use the same port
     /// If false, failing to join the group is a warning in the log, and the service works without multicast. If only
-    /// some of several interfaces can join, those are used.
+    /// some of several interfaces can join, those are used, and the others when they can. If true, the interfaces must
+    /// be there only when the service starts.
     bool required = true;
 
     static constexpr std::size_t most_interfaces = 8;

@@ -5,6 +5,7 @@
 #include <cles/link.hpp>
 
 #include "transport/group_port.hpp"
+#include "transport/interface_watch.hpp"
 #include "transport/ip_interface.hpp"
 #include "transport/member_handler.hpp"
 #include "transport/transports.hpp"
@@ -154,6 +155,13 @@ std::vector<core::network_interface> asio_environment::interfaces() { return tra
 
 core::network_interface asio_environment::find_interface(const std::string& name) {
     return transport::find_interface(name);
+}
+
+std::shared_ptr<void> asio_environment::watch_interfaces(std::function<void()> on_change) {
+    const auto watch = std::make_shared<transport::interface_watch>(executor_, std::move(on_change));
+    watch->start();
+    // What waits for the system keeps it alive, so its end is not that of the last pointer.
+    return {watch.get(), [watch](void*) { watch->stop(); }};
 }
 
 std::shared_ptr<core::group_port> asio_environment::join(const core::network_interface& by,

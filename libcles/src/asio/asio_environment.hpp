@@ -76,6 +76,7 @@ class asio_environment final : public core::environment {
 
     std::vector<core::network_interface> interfaces() override;
     core::network_interface find_interface(const std::string& name) override;
+    std::shared_ptr<void> watch_interfaces(std::function<void()> on_change) override;
     std::shared_ptr<core::group_port> join(const core::network_interface& by, const multicast_options& where) override;
 
   private:

@@ -80,6 +80,12 @@ class environment : public clock {
     virtual std::vector<network_interface> interfaces() = 0;
     /// \throws boost::system::system_error if there is none of that name, or it is down or has no IPv4 address
     virtual network_interface find_interface(const std::string& name) = 0;
+    /// Calls `on_change` after the interfaces of this host or their addresses may have changed, until what is returned
+    /// is destroyed. Null: they never change. \throws boost::system::system_error if the system does not report it
+    virtual std::shared_ptr<void> watch_interfaces(std::function<void()> on_change) {
+        static_cast<void>(on_change);
+        return nullptr;
+    }
     /// Joins a multicast group on an interface. \throws boost::system::system_error
     virtual std::shared_ptr<group_port> join(const network_interface& by, const multicast_options& where) = 0;
 };

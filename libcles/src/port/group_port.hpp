@@ -4,6 +4,7 @@
 #include "protocol/request_line.hpp"
 
 #include <boost/container_hash/hash.hpp>
+#include <boost/system/error_code.hpp>
 
 #include <compare>
 #include <concepts>
@@ -23,6 +24,7 @@ struct network_interface {
     int index = 0;
     std::uint32_t address = 0; ///< the first one; 127.0.0.1 is 0x7f000001; 0: none
     bool loopback = false;
+    bool up = false;             ///< switched on
     bool running = false;        ///< up, and with a link
     bool multicast = false;      ///< as the system reports it: false for loopback, which works nevertheless
     bool point_to_point = false; ///< such as a tunnel
@@ -141,6 +143,8 @@ class datagram_list {
 struct datagrams_done {
     std::size_t count = 0;
     std::size_t bytes = 0;
+    std::size_t failed = 0;          ///< how many the system did not send: of these, or that were pending before
+    boost::system::error_code why{}; ///< the last one of those
 };
 
 /// A node's endpoint in a multicast group on one interface: receives the group, and sends from an address and port that
@@ -155,7 +159,7 @@ class group_port {
     /// Starts to deliver what arrives. The listener must live until `close`.
     virtual void start(group_listener& owner) = 0;
     /// Sends to the group; datagrams for which the socket has no space are pending. One that cannot be sent for another
-    /// reason counts as lost in the network.
+    /// reason counts as failed, and as lost in the network.
     /// \return less than everything if the limit on pending bytes is reached
     virtual datagrams_done send(datagram_list all) = 0;
     /// Sends one datagram to a source in the group, which receives it if it has called `receive_own`. If the socket has

@@ -71,6 +71,10 @@ void udp_codec::send(const datagram_origin& to, std::string_view line) {
     static_cast<void>(all_->send(source_of(to), line)); // else it is lost, as datagrams may be
 }
 
+void udp_codec::contact(const datagram_origin& with) {
+    static_cast<void>(all_->contact(source_of(with))); // without such a member, there is no answer
+}
+
 void udp_codec::check_peer(const datagram_origin& with, time_point since) { all_->check_peer(source_of(with), since); }
 
 void udp_codec::release(const datagram_origin& which) { all_->release(source_of(which)); }

@@ -25,6 +25,7 @@ class udp_codec final : public transport::datagram_codec, private security::data
     void stop() override;
     void receive(const endpoint& from, std::string_view datagram) override;
     void send(const transport::datagram_origin& to, std::string_view line) override;
+    void contact(const transport::datagram_origin& with) override;
     void check_peer(const transport::datagram_origin& with, time_point since) override;
     void release(const transport::datagram_origin& which) override;
     [[nodiscard]] std::string name_of(std::uint32_t member) const override;

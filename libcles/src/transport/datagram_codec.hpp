@@ -76,6 +76,8 @@ class datagram_codec {
     virtual void receive(const endpoint& from, std::string_view datagram) = 0;
     /// Seals a line without its LF, and transmits it now, or when the other end has proved who it is.
     virtual void send(const datagram_origin& to, std::string_view line) = 0;
+    /// Begins a session with the other end, unless one is beginning.
+    virtual void contact(const datagram_origin& with) = 0;
     /// A request that was sent at `since` is sent again: the other end may have restarted.
     virtual void check_peer(const datagram_origin& with, time_point since) = 0;
     /// The socket no longer `holds` it.

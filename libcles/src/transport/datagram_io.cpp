@@ -141,6 +141,10 @@ core::datagrams_done send_batch::send_all(core::datagram_list all, const udp::en
         }
         total.count += done.count;
         total.bytes += done.bytes;
+        if (done.failed != 0) {
+            total.failed += done.failed;
+            total.why = done.why;
+        }
         for (auto left = done.count; left != 0; --left) {
             all.drop_first();
         }
@@ -185,6 +189,10 @@ std::optional<core::datagrams_done> send_batch::send_runs(core::datagram_list al
         return std::nullopt;
     }
     core::datagrams_done done;
+    if (sent < 1) {
+        done.failed = in_each[0];
+        done.why.assign(errno, boost::system::system_category());
+    }
     const auto count_done = static_cast<std::size_t>(std::max(sent, 1)); // the first is sent, or lost
     for (std::size_t i = 0; i < count_done; ++i) {
         done.count += in_each[i];

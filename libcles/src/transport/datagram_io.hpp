@@ -28,8 +28,8 @@ class send_batch {
     /// \pre the socket outlives this, and is non-blocking
     explicit send_batch(udp::socket& socket) noexcept;
 
-    /// Sends to the connected peer, or else to `to`. A datagram that cannot be sent counts as lost in the network, and
-    /// as done. \return what is done; nothing if there is no space \pre there is one
+    /// Sends to the connected peer, or else to `to`. A datagram that cannot be sent counts as failed, as lost in the
+    /// network, and as done. \return what is done; nothing if there is no space \pre there is one
     core::datagrams_done send(core::datagram_list all, const udp::endpoint* to = nullptr) noexcept;
     /// The same, as long as there is space.
     core::datagrams_done send_all(core::datagram_list all, const udp::endpoint* to) noexcept;

@@ -343,6 +343,10 @@ core::datagrams_done group_port::send(core::datagram_list all) {
         return {.bytes = all.bytes().size()}; // all of it is lost
     }
     auto taken = unsent() == 0 ? burst_.send_all(all, &group_) : core::datagrams_done{};
+    if (const auto before = std::exchange(failed_, 0); before != 0) {
+        taken.why = taken.failed != 0 ? taken.why : why_;
+        taken.failed += before;
+    }
     for (auto sent = taken.count; sent != 0; --sent) {
         all.drop_first();
     }
@@ -392,6 +396,10 @@ void group_port::send_rest() {
                                       &group_);
     waiting_at_ += done.bytes;
     waiting_sent_ += done.count;
+    if (done.failed != 0) {
+        failed_ += done.failed;
+        why_ = done.why;
+    }
     if (unsent() != 0) {
         wait_until_writable();
         return;

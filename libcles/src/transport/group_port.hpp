@@ -65,6 +65,8 @@ class group_port final : public core::group_port, public std::enable_shared_from
     std::vector<std::uint16_t> waiting_sizes_; // of each
     std::size_t waiting_at_ = 0;               // bytes of them that were sent
     std::size_t waiting_sent_ = 0;             // how many were sent
+    std::size_t failed_ = 0;                   // of them, not reported yet
+    boost::system::error_code why_;
     std::optional<receive_batch> own_arrived_; // once it receives what is sent to `source`
     bool waits_until_writable_ = false;
 };

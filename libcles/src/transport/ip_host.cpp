@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/ip_host.hpp"
 
-#include "transport/member_handler.hpp"
-
 #include <boost/asio/error.hpp>
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/post.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/system/system_error.hpp>
 
 #include <cerrno>
-#include <utility>
 
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -24,29 +21,25 @@ std::optional<asio::ip::address> literal_address(const url& where) {
     return is_name ? std::nullopt : std::optional{address};
 }
 
-namespace {
-
-std::vector<asio::ip::address> addresses_of(const asio::ip::tcp::resolver::results_type& found) {
+std::vector<asio::ip::address> look_up_now(const std::string& host, error_code& code) {
+    asio::io_context lookup;
+    asio::ip::tcp::resolver resolver{lookup}; // an address is the same for TCP and UDP
     std::vector<asio::ip::address> addresses;
-    for (const auto& each : found) {
+    for (const auto& each : resolver.resolve(host, "", code)) {
         addresses.push_back(each.endpoint().address());
+    }
+    if (!code && addresses.empty()) {
+        code = asio::error::host_not_found;
     }
     return addresses;
 }
-
-} // namespace
 
 asio::ip::address resolve(const url& where) {
     if (const auto literal = literal_address(where)) {
         return *literal;
     }
-    asio::io_context lookup;
-    asio::ip::tcp::resolver resolver{lookup};
     error_code code;
-    const auto addresses = addresses_of(resolver.resolve(where.host, "", code));
-    if (!code && addresses.empty()) {
-        code = asio::error::host_not_found;
-    }
+    const auto addresses = look_up_now(where.host, code);
     if (code) {
         throw boost::system::system_error{code};
     }
@@ -74,41 +67,6 @@ void set_traffic_class(int socket, const url& where, error_code& code) {
                             : ::setsockopt(socket, IPPROTO_IP, IP_TOS, &value, sizeof value)) != 0) {
         code.assign(errno, boost::system::system_category());
     }
-}
-
-void host_lookup::start(const url& where, std::chrono::milliseconds within, callback done) {
-    done_ = std::move(done);
-    if (const auto literal = literal_address(where)) {
-        asio::post(resolver_.get_executor(),
-                   [self = shared_from_this(), address = *literal] { self->end({}, {address}); });
-        return;
-    }
-    timeout_.expires_after(within);
-    wait_call<&host_lookup::on_timeout>(timeout_, shared_from_this());
-    resolver_.async_resolve(where.host, "",
-                            [self = shared_from_this()](error_code code, asio::ip::tcp::resolver::results_type found) {
-                                self->end(code, addresses_of(found));
-                            });
-}
-
-void host_lookup::on_timeout(error_code code) {
-    if (!code) {
-        end(asio::error::timed_out, {});
-    }
-}
-
-void host_lookup::end(error_code code, const std::vector<asio::ip::address>& found) {
-    const auto done = std::move(done_);
-    give_up();
-    if (done) {
-        done(!code && found.empty() ? asio::error::host_not_found : code, found);
-    }
-}
-
-void host_lookup::give_up() {
-    done_ = nullptr;
-    resolver_.cancel();
-    timeout_.cancel();
 }
 
 } // namespace cles::transport

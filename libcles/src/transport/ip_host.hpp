@@ -4,15 +4,9 @@
 #include <cles/identity.hpp>
 #include <cles/url.hpp>
 
-#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/address.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/steady_timer.hpp>
 #include <boost/system/error_code.hpp>
 
-#include <chrono>
-#include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,32 +17,12 @@ namespace cles::transport {
 /// Marks what an open socket sends with the DSCP of its URL, if there is one (RFC 2474; RFC 3542 for IPv6).
 void set_traffic_class(int socket, const url& where, boost::system::error_code& code);
 
-/// Looks up a host's addresses without blocking, on the resolver thread that Asio has for each execution context. The
-/// first name that is looked up starts it; addresses never do.
-class host_lookup : public std::enable_shared_from_this<host_lookup> {
-  public:
-    /// All addresses, in the system's order of preference; empty only with an error.
-    using callback = std::function<void(boost::system::error_code, const std::vector<boost::asio::ip::address>&)>;
-
-    explicit host_lookup(const boost::asio::any_io_executor& executor) : resolver_(executor), timeout_(executor) {}
-
-    /// The callback is called once, and never from inside the call: with `timed_out` after `within`, however long the
-    /// system takes.
-    void start(const url& where, std::chrono::milliseconds within, callback done);
-    /// The callback is not called any more.
-    void give_up();
-
-  private:
-    void on_timeout(boost::system::error_code code);
-    void end(boost::system::error_code code, const std::vector<boost::asio::ip::address>& found);
-
-    boost::asio::ip::tcp::resolver resolver_; // an address is the same for TCP and UDP
-    boost::asio::steady_timer timeout_;
-    callback done_;
-};
-
 /// The address of a URL's host if it is an address or `localhost`. Nothing: it is a name that has to be looked up.
 std::optional<boost::asio::ip::address> literal_address(const url& where);
+
+/// The addresses of a host's name, in the system's order of preference; empty only with an error. Blocks, perhaps for
+/// many seconds.
+std::vector<boost::asio::ip::address> look_up_now(const std::string& host, boost::system::error_code& code);
 
 /// The first address of a URL's host; a name is looked up, which blocks. Only for listening; use `host_lookup` to dial.
 /// \throws boost::system::system_error

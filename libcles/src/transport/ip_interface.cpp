@@ -35,6 +35,7 @@ core::network_interface interface_of(const ifaddrs& entry) {
     return {.name = entry.ifa_name,
             .index = static_cast<int>(::if_nametoindex(entry.ifa_name)),
             .loopback = (flags & IFF_LOOPBACK) != 0,
+            .up = (flags & IFF_UP) != 0,
             .running = (flags & IFF_UP) != 0 && (flags & IFF_RUNNING) != 0,
             .multicast = (flags & IFF_MULTICAST) != 0,
             .point_to_point = (flags & IFF_POINTOPOINT) != 0};
@@ -53,13 +54,11 @@ void take_address(core::network_interface& of, const ifaddrs& entry) noexcept {
 
 core::network_interface find_interface(const std::string& name) {
     core::network_interface found;
-    bool up = false;
     const auto all = addresses_of_host();
     for (const auto* entry = all.get(); entry != nullptr; entry = entry->ifa_next) {
         if (name == entry->ifa_name) {
             if (found.name.empty()) {
                 found = interface_of(*entry);
-                up = (entry->ifa_flags & IFF_UP) != 0;
             }
             take_address(found, *entry);
         }
@@ -67,7 +66,7 @@ core::network_interface find_interface(const std::string& name) {
     if (found.index == 0) {
         refuse(ENODEV);
     }
-    if (!up) {
+    if (!found.up) {
         refuse(ENETDOWN);
     }
     if (found.address == 0) {

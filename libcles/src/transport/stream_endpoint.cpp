@@ -15,92 +15,120 @@ using boost::system::error_code;
 
 // --- Dialling ---
 
-stream_dialler::stream_dialler(const asio::any_io_executor& executor, const limits& bounds, identify_function identify,
-                               dial_callback done, codec_maker make_codec)
-    : socket_(executor), timeout_(executor, bounds.connect), bounds_(bounds), identify_(std::move(identify)),
-      done_(std::move(done)), make_codec_(std::move(make_codec)) {}
+/// The connection to one endpoint.
+class stream_dialler::attempt : public std::enable_shared_from_this<attempt> {
+  public:
+    attempt(stream_dialler& owner, std::size_t which)
+        : owner_(std::static_pointer_cast<stream_dialler>(owner.shared_from_this())), socket_(owner.executor()),
+          which_(which) {}
 
-void stream_dialler::start(std::vector<stream_address> where) {
-    where_ = std::move(where);
-    wait_call<&stream_dialler::on_timeout>(timeout_, shared_from_this());
-    connect();
-}
+    [[nodiscard]] std::size_t which() const noexcept { return which_; }
+    [[nodiscard]] stream_socket& socket() noexcept { return socket_; }
+    [[nodiscard]] const std::shared_ptr<stream_link>& link() const noexcept { return link_; }
 
-void stream_dialler::on_timeout(error_code code) {
-    if (!code) {
-        fail(asio::error::timed_out);
+    void connect(const stream_address& where) {
+        error_code code;
+        open_private(socket_, where.protocol(), code);
+        if (code) {
+            post_call<&attempt::on_connected>(socket_.get_executor(), shared_from_this(), code);
+        } else {
+            socket_.async_connect(where, member_handler::calling<&attempt::on_connected>(shared_from_this()));
+        }
     }
-}
-
-void stream_dialler::connect() {
-    const auto& where = where_[tried_++];
-    error_code code;
-    open_private(socket_, where.protocol(), code);
-    if (code) {
-        post_call<&stream_dialler::on_connected>(socket_.get_executor(), shared_from_this(), code);
-    } else {
-        socket_.async_connect(where, member_handler::calling<&stream_dialler::on_connected>(shared_from_this()));
-    }
-}
-
-void stream_dialler::on_connected(error_code code) {
-    if (!done_) {
-        return;
-    }
-    if (!code) {
-        socket_.remote_endpoint(code); // Asio takes a Unix socket for connected if the listener's queue was full
-        code = code == asio::error::not_connected ? asio::error::try_again : code;
-    }
-    if (code && tried_ < where_.size()) {
-        error_code ignored;
-        socket_.close(ignored);
-        connect();
-    } else if (code) {
-        fail(code);
-    } else {
-        make_link();
-    }
-}
-
-void stream_dialler::make_link() {
-    auto peer = identify_(socket_);
-    auto codec = make_codec_ ? make_codec_(peer) : nullptr;
-    made_ = std::make_shared<stream_link>(std::move(socket_), std::move(peer), bounds_, std::move(codec));
-    if (make_codec_) {
-        made_->open([weak = weak_from_this()](error_code code) {
-            if (const auto self = weak.lock()) {
-                self->complete(code);
+    void open(std::shared_ptr<stream_link> link) {
+        link_ = std::move(link);
+        link_->open([weak = weak_from_this()](error_code code) {
+            const auto self = weak.lock();
+            if (const auto owner = self ? self->owner_.lock() : nullptr) {
+                owner->on_opened(*self, code);
             }
         });
+    }
+    void close() {
+        owner_.reset();
+        error_code ignored;
+        socket_.close(ignored);
+        if (link_) {
+            link_->close();
+        }
+    }
+
+  private:
+    void on_connected(error_code code) {
+        if (const auto owner = owner_.lock()) {
+            owner->on_connected(*this, code);
+        }
+    }
+
+    std::weak_ptr<stream_dialler> owner_;
+    stream_socket socket_;
+    std::size_t which_;
+    std::shared_ptr<stream_link> link_; // while it is being opened
+};
+
+stream_dialler::stream_dialler(const asio::any_io_executor& executor, const limits& bounds, identify_function identify,
+                               dial_callback done, codec_maker make_codec)
+    : address_dialler(executor, bounds, asio::error::timed_out, std::move(done)), bounds_(bounds),
+      identify_(std::move(identify)), make_codec_(std::move(make_codec)) {}
+
+void stream_dialler::start(std::vector<stream_address> where, std::function<void(std::size_t)> answered) {
+    where_ = std::move(where);
+    begin_race(where_.size(), std::move(answered));
+}
+
+void stream_dialler::begin(std::size_t which) {
+    attempts_.push_back(std::make_shared<attempt>(*this, which));
+    attempts_.back()->connect(where_[which]);
+}
+
+void stream_dialler::on_connected(attempt& by, error_code code) {
+    auto& socket = by.socket();
+    if (!code) {
+        socket.remote_endpoint(code); // Asio takes a Unix socket for connected if the listener's queue was full
+        code = code == asio::error::not_connected ? asio::error::try_again : code;
+    }
+    if (code) {
+        on_failed(by, code);
+        return;
+    }
+    auto peer = identify_(socket);
+    auto codec = make_codec_ ? make_codec_(peer) : nullptr;
+    auto made = std::make_shared<stream_link>(std::move(socket), std::move(peer), bounds_, std::move(codec));
+    if (make_codec_) {
+        note_acceptance();
+        continue_race();
+        by.open(std::move(made));
     } else {
-        complete({});
+        complete(by, std::move(made));
     }
 }
 
-void stream_dialler::complete(error_code code) {
-    const auto done = std::exchange(done_, nullptr);
-    auto made = std::exchange(made_, nullptr);
-    timeout_.cancel();
-    if (done) {
-        done(code, code ? nullptr : std::move(made));
+void stream_dialler::on_opened(attempt& by, error_code code) {
+    if (code) {
+        on_failed(by, code);
+    } else {
+        complete(by, by.link());
     }
 }
 
-void stream_dialler::fail(error_code why) {
-    const auto done = std::exchange(done_, nullptr);
-    give_up();
-    if (done) {
-        done(why, nullptr);
+void stream_dialler::on_failed(attempt& by, error_code code) {
+    if (by.link()) {
+        refusal_ = code; // says more than that other addresses cannot be reached
     }
+    std::erase_if(attempts_, [&by](const auto& one) { return one.get() == &by; });
+    note_failure(refusal_ ? refusal_ : code);
+    continue_race();
 }
 
-void stream_dialler::give_up() {
-    done_ = nullptr;
-    error_code ignored;
-    socket_.close(ignored);
-    timeout_.cancel();
-    if (const auto made = std::exchange(made_, nullptr)) {
-        made->close();
+void stream_dialler::complete(const attempt& by, link_ptr made) {
+    const auto which = by.which();
+    std::erase_if(attempts_, [&by](const auto& one) { return one.get() == &by; });
+    win(which, std::move(made));
+}
+
+void stream_dialler::close_attempts() {
+    for (const auto& one : std::exchange(attempts_, {})) {
+        one->close();
     }
 }
 

@@ -3,6 +3,7 @@
 
 #include <cles/link.hpp>
 
+#include "transport/address_dialler.hpp"
 #include "transport/private_socket.hpp"
 #include "transport/stream_link.hpp"
 
@@ -23,37 +24,33 @@ using stream_address = boost::asio::generic::stream_protocol::endpoint;
 /// Prepares a connected socket and returns the identity of its peer.
 using identify_function = std::function<identity(stream_socket&)>;
 
-/// Makes one connection, to the first of several endpoints that accepts it, within `limits::connect` in all since this
-/// was created.
-class stream_dialler : public std::enable_shared_from_this<stream_dialler> {
+/// Makes one connection, to the first of several endpoints that answers. With a codec, an endpoint has answered when
+/// the link is open.
+class stream_dialler final : public address_dialler {
   public:
     /// With a codec, the link is open when `done` receives it.
     stream_dialler(const boost::asio::any_io_executor& executor, const limits& bounds, identify_function identify,
                    dial_callback done, codec_maker make_codec = nullptr);
 
-    /// \pre there is at least one
-    void start(std::vector<stream_address> where);
-    /// Ends without a connection.
-    void fail(boost::system::error_code why);
-    /// As above, without the callback.
-    void give_up();
+    /// `answered` is called with the number of the endpoint, just before `done`. \pre there is at least one
+    void start(std::vector<stream_address> where, std::function<void(std::size_t)> answered = nullptr);
 
   private:
-    void on_timeout(boost::system::error_code code);
-    void connect();
-    void on_connected(boost::system::error_code code);
-    void make_link();
-    void complete(boost::system::error_code code);
+    class attempt;
 
-    stream_socket socket_;
-    boost::asio::steady_timer timeout_;
+    void begin(std::size_t which) override;
+    void close_attempts() override;
+    void on_connected(attempt& by, boost::system::error_code code);
+    void on_opened(attempt& by, boost::system::error_code code);
+    void on_failed(attempt& by, boost::system::error_code code);
+    void complete(const attempt& by, link_ptr made);
+
     limits bounds_;
     identify_function identify_;
-    dial_callback done_;
+    boost::system::error_code refusal_; // by the codec, at an address that has answered
     codec_maker make_codec_;
-    std::shared_ptr<stream_link> made_; // while it is being opened
     std::vector<stream_address> where_;
-    std::size_t tried_ = 0;
+    std::vector<std::shared_ptr<attempt>> attempts_; // those that may still succeed
 };
 
 /// Accepts connections and makes links of them.

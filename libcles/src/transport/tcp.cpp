@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "transport/host_lookup.hpp"
 #include "transport/ip_host.hpp"
 #include "transport/stream_endpoint.hpp"
 #include "transport/transports.hpp"
@@ -8,6 +9,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstring>
 #include <memory>
 #include <utility>
@@ -98,27 +100,31 @@ std::function<void()> dial_tcp(const asio::any_io_executor& executor, const url&
     const auto dialler = std::make_shared<stream_dialler>(
         executor, bounds, [where, bounds](stream_socket& made) { return identify(made, where, bounds); },
         std::move(done), std::move(make_codec));
-    const auto connect = [dialler, port = where.port](const std::vector<asio::ip::address>& found) {
+    const auto lookup = std::make_shared<host_lookup>(executor, where);
+    const auto connect = [dialler, port = where.port,
+                          weak = std::weak_ptr{lookup}](const std::vector<asio::ip::address>& found) {
         std::vector<stream_address> endpoints;
         endpoints.reserve(found.size());
         for (const auto& address : found) {
             endpoints.emplace_back(tcp::endpoint{address, port});
         }
-        dialler->start(std::move(endpoints));
+        dialler->start(std::move(endpoints), [found, weak](std::size_t which) {
+            if (const auto by = weak.lock()) {
+                by->prefer(found[which]);
+            }
+        });
     };
     if (const auto literal = literal_address(where)) {
         connect({*literal});
         return [dialler] { dialler->give_up(); };
     }
-    const auto lookup = std::make_shared<host_lookup>(executor);
-    lookup->start(where, bounds.connect,
-                  [dialler, connect](error_code code, const std::vector<asio::ip::address>& found) {
-                      if (code) {
-                          dialler->fail(code);
-                      } else {
-                          connect(found);
-                      }
-                  });
+    lookup->start(bounds.connect, [dialler, connect](error_code code, const std::vector<asio::ip::address>& found) {
+        if (code) {
+            dialler->fail(code);
+        } else {
+            connect(found);
+        }
+    });
     return [lookup, dialler] {
         lookup->give_up();
         dialler->give_up();

@@ -1,16 +1,24 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/udp.hpp"
 
+#include "transport/host_lookup.hpp"
 #include "transport/ip_host.hpp"
 #include "transport/member_handler.hpp"
 #include "transport/private_socket.hpp"
 #include "transport/transports.hpp"
+#include "transport/udp_dialler.hpp"
 
 #include <boost/asio/error.hpp>
+#include <boost/asio/ip/address_v4.hpp>
 #include <boost/asio/ip/v6_only.hpp>
+#include <boost/asio/socket_base.hpp>
 
 #include <array>
+#include <cerrno>
 #include <utility>
+
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 namespace cles::transport {
 namespace asio = boost::asio;
@@ -41,7 +49,7 @@ void udp_port::start(std::function<void(link_ptr)> on_link) {
     receive();
 }
 
-link_ptr udp_port::connect_link(const udp::endpoint& peer, identity who, std::uint32_t member) {
+std::shared_ptr<udp_link> udp_port::connect_link(const udp::endpoint& peer, identity who, std::uint32_t member) {
     connected_ = true;
     auto made = std::make_shared<udp_link>(shared_from_this(), datagram_origin{peer, member}, std::move(who));
     links_.emplace(made->origin(), made.get());
@@ -177,6 +185,7 @@ void udp_port::on_established(const datagram_origin& with, std::uint32_t epoch) 
                 held->lose(asio::error::connection_reset);
             }
         }
+        held->on_session();
     }
 }
 
@@ -210,6 +219,13 @@ void udp_port::check_peer(const udp_link& link, time_point since) {
     if (codec_) {
         codec_->check_peer(link.origin(), since);
     }
+}
+
+bool udp_port::contact(const udp_link& link) {
+    if (codec_) {
+        codec_->contact(link.origin());
+    }
+    return codec_ != nullptr;
 }
 
 // If the socket has no space for all of them, the rest is sealed again later: that is simpler than to keep both forms.
@@ -428,6 +444,19 @@ void udp_link::check_peer(time_point since) {
     }
 }
 
+void udp_link::ask() {
+    if (port_ != nullptr && !port_->contact(*this)) {
+        output_.append("PULL self:cles id=").append(std::to_string(udp_dialler::question_id)).push_back('\n');
+        flush();
+    }
+}
+
+void udp_link::on_session() {
+    if (const auto begun = std::exchange(on_session_, nullptr)) {
+        begun();
+    }
+}
+
 void udp_link::close() {
     if (const auto port = std::exchange(port_, nullptr)) {
         owner_.reset();
@@ -439,8 +468,8 @@ void udp_link::close() {
 
 namespace {
 
-link_ptr connect(const asio::any_io_executor& executor, const url& where, const udp::endpoint& endpoint,
-                 const sealed_peer_maker& peer, error_code& code) {
+std::shared_ptr<udp_link> connect(const asio::any_io_executor& executor, const url& where,
+                                  const udp::endpoint& endpoint, const sealed_peer_maker& peer, error_code& code) {
     sealed_peer who;
     if (peer) {
         who = peer(code);
@@ -478,6 +507,33 @@ class udp_transport final : public link_transport {
     }
 };
 
+void set_ipv4_option(udp::socket& socket, int option, int value) {
+    if (::setsockopt(socket.native_handle(), IPPROTO_IP, option, &value, sizeof value) != 0) {
+        throw boost::system::system_error{errno, boost::system::system_category()};
+    }
+}
+
+/// Binds a socket to all IPv4 addresses of this host, and leaves multicast groups of the same port to others.
+///
+/// The address 0.0.0.0 includes those of groups, so the system gives a port to both only if both sockets allow reuse.
+/// But two that allow it could then also listen at the same address, where the later one takes what is for the earlier
+/// one. So another socket claims the port first, without reuse, at an address that no group has.
+void bind_beside_groups(udp::socket& socket, const udp::endpoint& at) {
+    const asio::socket_base::reuse_address reuse{true};
+    set_ipv4_option(socket, IP_MULTICAST_ALL, 0); // otherwise it receives the groups that others have joined
+    if (at.port() == 0) {
+        socket.bind(at); // to a port that is free in all respects
+        socket.set_option(reuse);
+        return;
+    }
+    auto claim = make_private<udp::socket>(socket.get_executor(), at.protocol());
+    set_ipv4_option(claim, IP_FREEBIND, 1); // loopback may be down
+    claim.bind({asio::ip::address_v4::loopback(), at.port()});
+    claim.set_option(reuse);
+    socket.set_option(reuse);
+    socket.bind(at);
+}
+
 } // namespace
 
 std::unique_ptr<acceptor> listen_udp(const asio::any_io_executor& executor, const url& where,
@@ -487,7 +543,11 @@ std::unique_ptr<acceptor> listen_udp(const asio::any_io_executor& executor, cons
     if (endpoint.address().is_v6()) {
         socket.set_option(asio::ip::v6_only{true});
     }
-    socket.bind(endpoint);
+    if (endpoint.address().is_v4() && endpoint.address().is_unspecified()) {
+        bind_beside_groups(socket, endpoint);
+    } else {
+        socket.bind(endpoint);
+    }
     error_code code;
     set_traffic_class(socket.native_handle(), where, code);
     if (code) {
@@ -496,20 +556,36 @@ std::unique_ptr<acceptor> listen_udp(const asio::any_io_executor& executor, cons
     return handle_of(std::make_shared<udp_port>(std::move(socket), std::move(codec)));
 }
 
-// Sends nothing: whether the peer exists shows when requests are answered.
+// To the only address of a host, this sends nothing: whether the peer exists shows when requests are answered.
 std::function<void()> dial_udp(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done, sealed_peer_maker peer) {
-    const auto lookup = std::make_shared<host_lookup>(executor);
-    lookup->start(where, bounds.connect,
-                  [executor, where, done = std::move(done),
-                   peer = std::move(peer)](error_code code, const std::vector<asio::ip::address>& found) {
-                      link_ptr made;
-                      if (!code) {
-                          made = connect(executor, where, {found.front(), where.port}, peer, code);
-                      }
-                      done(code, made);
-                  });
-    return [lookup] { lookup->give_up(); };
+    const auto lookup = std::make_shared<host_lookup>(executor, where);
+    const auto make = [executor, where, peer = std::move(peer)](const udp::endpoint& to, error_code& code) {
+        return connect(executor, where, to, peer, code);
+    };
+    // Holds `done`. Its time begins here.
+    const auto dialler = std::make_shared<udp_dialler>(executor, bounds, make, std::move(done));
+    lookup->start(bounds.connect, [dialler, port = where.port, weak = std::weak_ptr{lookup}](
+                                      error_code code, const std::vector<asio::ip::address>& found) {
+        if (code) {
+            dialler->fail(code);
+            return;
+        }
+        std::vector<udp::endpoint> endpoints;
+        endpoints.reserve(found.size());
+        for (const auto& address : found) {
+            endpoints.emplace_back(address, port);
+        }
+        dialler->start(std::move(endpoints), [found, weak](std::size_t which) {
+            if (const auto by = weak.lock()) {
+                by->prefer(found[which]);
+            }
+        });
+    });
+    return [lookup, dialler] {
+        lookup->give_up();
+        dialler->give_up();
+    };
 }
 
 std::unique_ptr<link_transport> make_udp() { return std::make_unique<udp_transport>(); }

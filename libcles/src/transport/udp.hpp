@@ -17,6 +17,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::transport {
@@ -50,10 +51,18 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     [[nodiscard]] std::string_view epoch() const noexcept override { return epoch_; }
     void check_peer(time_point since) override;
 
+    // For `udp_dialler`, before the link has its owner.
+    /// Asks the peer for a sign of life: a session with it if there is a codec, otherwise the reply to a request.
+    [[gnu::cold]] void ask();
+    /// \param begun is called when the first session has begun
+    [[gnu::cold]] void await_session(std::function<void()> begun) { on_session_ = std::move(begun); }
+
     // For the port.
     [[nodiscard]] const datagram_origin& origin() const noexcept { return peer_; }
     /// Notes the epoch that the peer has stated. Returns whether it had stated another one.
     bool note_epoch(std::uint32_t epoch);
+    /// The peer has stated its epoch.
+    [[gnu::cold]] void on_session();
     /// The peer has restarted, and this is the only link of the socket.
     [[gnu::cold]] void on_restart();
     [[gnu::cold]] void on_unanswered(bool lost);
@@ -75,6 +84,7 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     std::optional<std::uint32_t> epoch_number_;
     std::string epoch_;
     std::shared_ptr<link_events> owner_;
+    std::function<void()> on_session_;
     std::vector<std::string> early_; // received before `start`
     std::string output_;
     std::string sending_; // output for which the socket has no space
@@ -100,7 +110,8 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     /// Listens: from now on, each new source becomes a link.
     [[gnu::cold]] void start(std::function<void(link_ptr)> on_link) override;
     /// The only link of a connected socket.
-    [[gnu::cold]] link_ptr connect_link(const udp::endpoint& peer, identity who, std::uint32_t member = 0);
+    [[gnu::cold]] std::shared_ptr<udp_link> connect_link(const udp::endpoint& peer, identity who,
+                                                         std::uint32_t member = 0);
     /// Accepts no new sources.
     [[gnu::cold]] void close() override;
     [[nodiscard, gnu::cold]] url local() const override;
@@ -113,6 +124,8 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     [[gnu::cold]] void wait_until_writable(std::weak_ptr<udp_link> link);
     [[gnu::cold]] void forget(const udp_link& link);
     void check_peer(const udp_link& link, time_point since);
+    /// Begins a session. Returns false if there is no codec.
+    [[gnu::cold]] bool contact(const udp_link& link);
     [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }
 
   private:

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/identity.hpp>
+
 #include "transport/stream_endpoint.hpp"
 #include "transport/transports.hpp"
 
@@ -51,7 +53,6 @@ identity identify_client(stream_socket& socket, const std::string& address, cons
     return who;
 }
 
-// A listener that is not trusted. The value is the id of its user.
 class listener_errors final : public boost::system::error_category {
   public:
     constexpr listener_errors() noexcept : error_category(0xA6D9'41B3'5F0E'72C8U) {} // see protocol/error.cpp
@@ -66,9 +67,8 @@ class listener_errors final : public boost::system::error_category {
     }
 };
 
-// Whoever listens could answer in the name of any node.
+// Other users could answer in the name of any node.
 error_code refusal_of(const identity& listener, std::string_view node, const user_names& users) {
-    static const listener_errors category;
     if (!listener.uid) {
         return boost::system::errc::make_error_code(boost::system::errc::permission_denied);
     }
@@ -77,7 +77,7 @@ error_code refusal_of(const identity& listener, std::string_view node, const use
     }
     const auto stated = users.find(*listener.uid);
     const bool is_that_node = stated != users.end() && (node.empty() || stated->second == node);
-    return is_that_node ? error_code{} : error_code{static_cast<int>(*listener.uid), category};
+    return is_that_node ? error_code{} : error_code{static_cast<int>(*listener.uid), untrusted_listener_category()};
 }
 
 // Permits all users to connect to a socket file that has just been made; who they are is then known. Another file that
@@ -219,3 +219,12 @@ std::unique_ptr<link_transport> make_unix(user_names users) {
 }
 
 } // namespace cles::transport
+
+namespace cles {
+
+const boost::system::error_category& untrusted_listener_category() noexcept {
+    static const transport::listener_errors category;
+    return category;
+}
+
+} // namespace cles

@@ -107,6 +107,7 @@ struct counters {
     std::uint64_t group_copied = 0;       ///< from a source that is not their sender's: others have repeated them
     std::uint64_t group_sent = 0;
     std::uint64_t group_unsent = 0; ///< too large, or too much was pending
+    std::uint64_t group_failed = 0; ///< not sent by the system, as when an interface is down
     std::uint64_t links_accepted = 0;
     std::uint64_t links_refused = 0;
     std::uint64_t links_evicted = 0; ///< closed in favour of others
@@ -127,7 +128,7 @@ BOOST_DESCRIBE_STRUCT(counters, (),
                        tables_failed, tables_told, entries_dropped, grants_sent, grants_received, granted_jobs_refused,
                        jobs_moved_in, jobs_moved_out, leases_expired, datagrams_withheld, datagrams_unsealed,
                        group_received, group_dropped, group_repeated, group_copied, group_sent, group_unsent,
-                       group_leases, links_open, links_accepted, links_refused, links_evicted, links_lost,
-                       bytes_received, bytes_sent))
+                       group_failed, group_leases, links_open, links_accepted, links_refused, links_evicted,
+                       links_lost, bytes_received, bytes_sent))
 
 } // namespace cles::core

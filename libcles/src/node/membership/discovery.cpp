@@ -222,6 +222,9 @@ void discovery::announce(std::chrono::milliseconds interval) {
     if (!host_.node().endpoints.empty()) { // otherwise no request could reach it
         announce(interval, false);
     }
+    if (std::exchange(asks_again_, false) && group_ != nullptr) {
+        group_->ask_again();
+    }
 }
 
 void discovery::announce(std::chrono::milliseconds interval, bool leaving) {
@@ -374,6 +377,14 @@ void discovery::expedite_announcement() {
     }
 }
 
+// The others learn at once from where it sends now, and where it can be reached.
+void discovery::on_interfaces_changed(time_point now) {
+    if (begun_ && !left_) {
+        asks_again_ = host_.node().security != nullptr;
+        announcer_.expedite(now);
+    }
+}
+
 // Called from inside a loop over all nodes, so log entries are posted.
 void discovery::on_peer(std::string_view node, membership::change what, std::string_view where) {
     const std::string name{node};
@@ -381,7 +392,12 @@ void discovery::on_peer(std::string_view node, membership::change what, std::str
         where.empty() ? std::string{" at no address that is reachable from here"} : " at " + std::string{where};
     switch (what) {
     case membership::change::appeared: host_.post_log(log_level::info, "discovered " + name + place); break;
-    case membership::change::moved: host_.post_log(log_level::info, name + " is now" + place); break;
+    case membership::change::moved:
+        host_.post_log(log_level::info, name + " is now" + place);
+        if (group_ != nullptr) { // what was bound at its old address may have ended with it
+            group_->feeds().rebind_soon(name, host_.now());
+        }
+        break;
     case membership::change::silent: host_.post_log(log_level::debug, name + " is no longer received"); break;
     case membership::change::returned: host_.post_log(log_level::debug, name + " is received again"); break;
     case membership::change::left: host_.post_log(log_level::info, name + " has left"); break;
@@ -434,7 +450,7 @@ void discovery::follow_incarnation(const std::string& name) {
         }
         host_.feeds().on_new_incarnation(name, another);
         if (group_ != nullptr) {
-            group_->feeds().on_new_incarnation(name, host_.now());
+            group_->feeds().rebind_soon(name, host_.now());
         }
     }
 }
@@ -468,7 +484,7 @@ bool discovery::expects_more_of(std::string_view node) const noexcept {
 }
 
 std::string discovery::unknown_reason() const {
-    if (group_ == nullptr) {
+    if (group_ == nullptr || group_->ports().empty()) {
         return gossip_ ? "no node that it asks knows that name; " : "";
     }
     const bool others = host_.node().counts.announcements_foreign != 0;

@@ -143,6 +143,7 @@ class discovery final : private announcement_listener, private membership::watch
     [[nodiscard]] std::size_t others() const override;
     void on_solicitation(bool by_name, time_point now) override;
     void on_announcement(heard_announcement heard, time_point now) override;
+    void on_interfaces_changed(time_point now) override;
     void on_peer(std::string_view node, membership::change what, std::string_view where) override;
     void probe(std::uint64_t ticket, const std::string& url);
     void follow_incarnation(const std::string& name);
@@ -162,6 +163,7 @@ class discovery final : private announcement_listener, private membership::watch
     std::uint64_t seq_ = 0;
     bool begun_ = false;
     bool left_ = false;
+    bool asks_again_ = false; // the group, after the next announcement
 };
 
 } // namespace cles::core

@@ -135,14 +135,14 @@ void group_bindings::put_updates(std::string_view lines) {
     for (std::size_t at = 0; at < lines.size();) {
         const auto next = lines.find('\n', at) + 1; // updates are whole lines
         if (next - at > protocol::datagram_bytes) {
-            send_to(out_, node_.counts, lines.substr(begin, at - begin));
+            send_to(out_, node_, lines.substr(begin, at - begin));
             ++node_.counts.updates_too_large;
             note_too_large(lines.substr(at, next - at));
             begin = next;
         }
         at = next;
     }
-    send_to(out_, node_.counts, lines.substr(begin));
+    send_to(out_, node_, lines.substr(begin));
 }
 
 // Nothing else notifies the publisher; an occasional entry is enough.

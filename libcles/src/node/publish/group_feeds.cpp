@@ -25,21 +25,34 @@ void group_feeds::add(group_feed& feed, time_point now) {
     ++at->second.feeds;
 }
 
-// A BIND that is lost is replaced by the next one.
-void group_feeds::send_bind(bound& b, time_point now) {
-    const auto lease =
-        std::clamp(node_.bounds.lease, std::chrono::milliseconds{1}, std::chrono::milliseconds{protocol::max_lease_ms});
+std::chrono::milliseconds group_feeds::lease() const {
+    return std::clamp(node_.bounds.lease, std::chrono::milliseconds{1},
+                      std::chrono::milliseconds{protocol::max_lease_ms});
+}
+
+std::string group_feeds::bind_line(const bound& b) const {
     std::string line;
     protocol::append_request(
-        line, {.verb = verb::bind, .noun = b.noun, .lease_ms = static_cast<std::uint32_t>(lease.count())});
-    out_.send(line);
-    const auto third = lease / 3;
+        line, {.verb = verb::bind, .noun = b.noun, .lease_ms = static_cast<std::uint32_t>(lease().count())});
+    return line;
+}
+
+void group_feeds::bind_on(group_port& added) {
+    for (const auto& [noun, b] : bound_) {
+        out_.send(added, bind_line(b));
+    }
+}
+
+// A BIND that is lost is replaced by the next one.
+void group_feeds::send_bind(bound& b, time_point now) {
+    out_.send(bind_line(b));
+    const auto third = lease() / 3;
     node_.deadlines.arm(b,
                         saturating_add(now, std::max(third - jitter_.quarter_of(third), std::chrono::milliseconds{1})));
 }
 
 // A short delay, so that one BIND reaches several nodes that start together.
-void group_feeds::on_new_incarnation(std::string_view node, time_point now) {
+void group_feeds::rebind_soon(std::string_view node, time_point now) {
     constexpr std::chrono::milliseconds soon{50};
     for (auto& [noun, b] : bound_) {
         const auto target = std::string_view{noun}.substr(0, noun.find(':'));

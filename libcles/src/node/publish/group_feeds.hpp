@@ -10,6 +10,7 @@
 #include "node/publish/subscription.hpp"
 #include "protocol/request_line.hpp"
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -21,6 +22,7 @@
 
 namespace cles::core {
 
+class group_port;
 class multicast_group;
 
 /// A feed that is bound through the multicast group: to one node's noun, or to that of every publisher.
@@ -55,8 +57,11 @@ class group_feeds {
     [[gnu::cold]] void remove(group_feed& feed);
     /// Removes and returns all feeds.
     [[nodiscard, gnu::cold]] std::vector<group_feed*> remove_all();
-    /// The node has restarted and knows no bindings: feeds bound to it, or to `all`, are soon bound again.
-    [[gnu::cold]] void on_new_incarnation(std::string_view node, time_point now);
+    /// The node may know no bindings, since it has restarted, or sends by other interfaces: feeds bound to it, or to
+    /// `all`, are soon bound again.
+    [[gnu::cold]] void rebind_soon(std::string_view node, time_point now);
+    /// This node sends by that port too from now on: those who receive it are asked at once.
+    [[gnu::cold]] void bind_on(group_port& added);
     /// Whether a feed is bound to the update's noun.
     [[nodiscard]] bool wants(const protocol::request_line& update) const;
     /// The node's next update counts as its first.
@@ -76,6 +81,8 @@ class group_feeds {
         std::size_t feeds = 0;
     };
 
+    [[nodiscard]] std::chrono::milliseconds lease() const;
+    [[nodiscard, gnu::cold]] std::string bind_line(const bound& b) const;
     [[gnu::cold]] void send_bind(bound& b, time_point now);
     [[gnu::cold]] void unbind(const group_feed& last);
     [[nodiscard]] bool has(std::string_view path, const group_feed* feed) const;

@@ -32,7 +32,10 @@ group_session::group_session(std::shared_ptr<node_state> host, multicast_group& 
     group_.add(*port_);
 }
 
-group_session::~group_session() { stop(); }
+group_session::~group_session() {
+    stop();
+    group_.remove(*port_);
+}
 
 void group_session::stop() {
     for (const auto& [key, each] : std::exchange(waiting_, {})) {

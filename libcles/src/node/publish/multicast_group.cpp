@@ -2,7 +2,6 @@
 #include "node/publish/multicast_group.hpp"
 
 #include <cles/json_reader.hpp>
-#include <cles/pending.hpp>
 
 #include "node/membership/membership.hpp"
 #include "node/security_protocol.hpp"
@@ -13,6 +12,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <utility>
 
 namespace cles::core {
@@ -37,6 +37,14 @@ std::vector<network_interface> interfaces_or_throw(environment& by, const multic
     }
 }
 
+void note_failure(node_state& node, const group_source& from, const boost::system::error_code& why) {
+    constexpr std::chrono::hours once_in{1};
+    const auto source = host_text(from);
+    if (node.log && node.logged.take({.kind = "unsent", .source = source, .in = once_in}, node.time.now())) {
+        node.post_log(log_level::warning, "cannot send to the multicast group from " + source + ": " + why.message());
+    }
+}
+
 } // namespace
 
 multicast_group::multicast_group(std::shared_ptr<node_state> host, std::uint32_t seed, std::weak_ptr<void> owner)
@@ -47,110 +55,282 @@ multicast_group::multicast_group(std::shared_ptr<node_state> host, std::uint32_t
 
 void multicast_group::join(environment& by, const multicast_options& where, bool insecure) {
     check(where);
-    if (where.interface == "auto") {
-        join_automatic(by, where, insecure);
-    } else {
-        join_all(by, where, insecure);
+    environment_ = &by;
+    where_ = where;
+    insecure_ = insecure;
+    chosen_.emplace(where);
+    watch(); // before the interfaces are listed, so that no change is missed
+    try {
+        if (where.interface == "auto") {
+            join_automatic();
+        } else {
+            join_all();
+        }
+    } catch (const error& e) {
+        if (where.required || e.code() == errc::insecure_listen) {
+            throw;
+        }
+        note(log_level::warning, "no multicast: " + e.message());
     }
+    compare_when_due();
 }
 
-void multicast_group::join(environment& by, const network_interface& interface, const multicast_options& where,
-                           bool insecure) {
-    if (!interface.loopback && !insecure && !node_->security) {
+void multicast_group::join(const network_interface& interface) {
+    if (!interface.loopback && !insecure_ && !node_->security) {
         throw error(errc::insecure_listen, "multicast on '" + interface.name +
                                                "' can be reached from other hosts, which are not authenticated; "
                                                "set 'insecure' to allow it");
     }
-    auto port = by.join(interface, where);
+    auto port = environment_->join(interface, where_);
     if (node_->security) {
         port = node_->security->seal(std::move(port));
     }
     const auto source = port->source();
-    sessions_.emplace_back(node_, *this, std::move(port), by.random());
-    interfaces_ += (interfaces_.empty() ? "" : ", ") + interface.name;
-    node_->write_log(log_level::info, node_->name + " has joined " + where.group + ":" + std::to_string(where.port) +
-                                          " on " + interface.name + ", sending from " + to_text(source));
+    members_.emplace_back(interface, node_, *this, std::move(port), environment_->random());
+    chosen_->on_joined(interface);
+    note(log_level::info, node_->name + " has joined " + where_.group + ":" + std::to_string(where_.port) + " on " +
+                              interface.name + ", sending from " + to_text(source));
 }
 
 // One interface is enough unless all are required.
-void multicast_group::join_all(environment& by, const multicast_options& where, bool insecure) {
+void multicast_group::join_all() {
     std::vector<error> failures;
-    for (const auto& name : interfaces_of(where)) {
+    for (const auto& name : interfaces_of(where_)) {
+        network_interface found;
         try {
-            join(by, by.find_interface(name), where, insecure);
+            found = environment_->find_interface(name);
+            join(found);
         } catch (const error& refused) {
+            chosen_->on_failed(found, false, node_->time.now());
             failures.push_back(refused);
         } catch (const boost::system::system_error& e) {
-            failures.push_back(cannot_join(where, name, e.code()));
+            if (!found.name.empty()) { // otherwise it can be joined after a change
+                chosen_->on_failed(found, true, node_->time.now());
+            }
+            failures.push_back(cannot_join(where_, name, e.code()));
         }
-        if (!failures.empty() && where.required) {
+        if (!failures.empty() && where_.required) {
             throw error{failures.front()};
         }
     }
-    if (sessions_.empty()) {
+    if (members_.empty()) {
         throw error{failures.front()};
     }
     for (const auto& e : failures) {
-        node_->write_log(log_level::warning, e.message());
+        note(log_level::warning, e.message());
     }
 }
 
 // An interface that cannot be joined was not requested by name.
-void multicast_group::join_automatic(environment& by, const multicast_options& where, bool insecure) {
-    std::string left_out;
+void multicast_group::join_automatic() {
     auto failure = boost::system::error_code{ENETDOWN, boost::system::system_category()};
-    for (const auto& interface : automatic(interfaces_or_throw(by, where))) {
-        if (sessions_.size() == multicast_options::most_interfaces) {
-            left_out += (left_out.empty() ? "" : ", ") + interface.name;
-            continue;
-        }
+    const auto steps = chosen_->compare(interfaces_or_throw(*environment_, where_));
+    for (const auto& interface : steps.join) {
         try {
-            join(by, interface, where, insecure);
+            join(interface);
         } catch (const error& refused) {
-            if (where.required) {
+            if (where_.required) {
                 throw;
             }
             failure = refused.code();
-            node_->write_log(log_level::warning, refused.message());
+            chosen_->on_failed(interface, false, node_->time.now());
+            note(log_level::warning, refused.message());
         } catch (const boost::system::system_error& e) {
             failure = e.code();
-            node_->write_log(log_level::warning, cannot_join(where, interface.name, failure).message());
+            chosen_->on_failed(interface, true, node_->time.now());
+            note(log_level::warning, cannot_join(where_, interface.name, failure).message());
         }
     }
-    if (sessions_.empty()) {
-        throw error(failure, cannot(where, where.interface) + "no interface of this host can be used");
+    if (members_.empty()) {
+        throw error(failure, cannot(where_, where_.interface) + "no interface of this host can be used");
     }
-    if (!left_out.empty()) {
-        node_->write_log(log_level::warning, "multicast on 'auto' uses " + interfaces_ + ", and skips " + left_out);
+    note_left_out(steps.left_out);
+}
+
+void multicast_group::note_left_out(const std::vector<std::string>& names) {
+    if (where_.interface != "auto" || names.empty() || names == left_out_) {
+        left_out_ = names;
+        return;
+    }
+    left_out_ = names;
+    std::string list;
+    for (const auto& name : names) {
+        list += (list.empty() ? "" : ", ") + name;
+    }
+    note(log_level::warning, "multicast on 'auto' uses " + interfaces() + ", and skips " + list);
+}
+
+std::string multicast_group::interfaces() const {
+    std::string names;
+    for (const auto& each : members_) {
+        names += (names.empty() ? "" : ", ") + each.where.name;
+    }
+    return names;
+}
+
+// Later, what is logged may not run user code inside a loop over the interfaces.
+void multicast_group::note(log_level level, std::string what) const {
+    if (started_) {
+        node_->post_log(level, std::move(what));
+    } else {
+        node_->write_log(level, what);
     }
 }
 
 void multicast_group::start() {
-    for (auto& each : sessions_) {
-        each.start();
+    started_ = true;
+    for (auto& each : members_) {
+        each.session.start();
     }
 }
 
 void multicast_group::stop() {
+    watch_.reset();
+    node_->deadlines.disarm(comparison_);
+    chosen_.reset();
     for (auto* feed : feeds_.remove_all()) {
         if (auto waiting = feed->mail().close()) {
             node_->completions.put(completion{
                 completion::event_failure{std::move(waiting), errc::stopped, "the service has been stopped"}});
         }
     }
-    for (auto& each : sessions_) {
-        each.stop();
+    for (auto& each : members_) {
+        each.session.stop();
     }
+}
+
+// -- changes of the interfaces ---------------------------------------------------------------------------------------
+
+void multicast_group::watch() {
+    try {
+        watch_ = environment_->watch_interfaces([this] {
+            if (chosen_) {
+                chosen_->on_change(node_->time.now());
+                compare_when_due();
+            }
+        });
+    } catch (const boost::system::system_error& e) {
+        note(log_level::warning, "changes of this host's interfaces will not be noticed: " + e.code().message());
+    }
+}
+
+void multicast_group::compare_when_due() {
+    if (const auto due = chosen_->due()) {
+        node_->deadlines.arm(comparison_, *due);
+    }
+}
+
+// The name of an alias is not among those of the interfaces.
+std::vector<network_interface> multicast_group::list_interfaces() const {
+    auto all = environment_->interfaces();
+    if (where_.interface == "auto") {
+        return all;
+    }
+    for (const auto& name : interfaces_of(where_)) {
+        if (std::ranges::find(all, name, &network_interface::name) == all.end()) {
+            try {
+                all.push_back(environment_->find_interface(name));
+            } catch (const boost::system::system_error&) { // there is none now
+            }
+        }
+    }
+    return all;
+}
+
+void multicast_group::follow_interfaces(time_point now) {
+    const auto keep = keep_owner();
+    std::vector<network_interface> all;
+    try {
+        all = list_interfaces();
+    } catch (const boost::system::system_error& e) {
+        note(log_level::warning, "cannot list the interfaces of this host: " + e.code().message());
+        chosen_->on_unlisted(now);
+        compare_when_due();
+        return;
+    }
+    const auto steps = chosen_->compare(all);
+    for (const auto& each : steps.leave) {
+        leave(each);
+    }
+    if (!chosen_) { // stopped meanwhile
+        return;
+    }
+    bool changed = !steps.leave.empty();
+    for (const auto& each : steps.join) {
+        changed = join_later(each, now) || changed;
+    }
+    note_left_out(steps.left_out);
+    if (changed && listener_ != nullptr) {
+        listener_->on_interfaces_changed(now);
+    }
+    compare_when_due();
+}
+
+// What others announce there is asked for, as at the start. In a secured fleet, they do not take questions from a
+// source that this node has not announced yet: they are asked after that.
+bool multicast_group::join_later(const network_interface& interface, time_point now) {
+    try {
+        join(interface);
+    } catch (const error& refused) {
+        if (chosen_->on_failed(interface, false, now)) {
+            note(log_level::warning, refused.message());
+        }
+        return false;
+    } catch (const boost::system::system_error& e) {
+        if (chosen_->on_failed(interface, true, now)) {
+            note(log_level::warning, cannot_join(where_, interface.name, e.code()).message());
+        }
+        return false;
+    }
+    auto& port = *ports_.back();
+    members_.back().session.start();
+    if (!node_->security) {
+        ask(port);
+    }
+    return true;
+}
+
+void multicast_group::ask(group_port& by) {
+    if (listener_ != nullptr) {
+        send(by, "BIND all:cles\n");
+    }
+    feeds_.bind_on(by);
+}
+
+void multicast_group::ask_again() {
+    for (auto* each : ports_) {
+        ask(*each);
+    }
+}
+
+void multicast_group::leave(const network_interface& interface) {
+    const auto at = std::ranges::find_if(members_, [&](const member_interface& each) {
+        return each.where.index == interface.index && each.where.address == interface.address;
+    });
+    if (at == members_.end()) {
+        return;
+    }
+    std::list<member_interface> left; // removed first: publishers that waited for its subscribers go on
+    left.splice(left.begin(), members_, at);
+    note(log_level::info, node_->name + " has left " + where_.group + ":" + std::to_string(where_.port) + " on " +
+                              interface.name + ", which does not have " + host_text({.address = interface.address}) +
+                              " any more");
 }
 
 // -- what is sent ----------------------------------------------------------------------------------------------------
 
-bool send_to(group_port& by, counters& counts, std::string_view lines) {
+bool send_to(group_port& by, node_state& node, std::string_view lines) {
     if (lines.empty()) {
         return true;
     }
     const auto taken = by.send(lines);
+    auto& counts = node.counts;
     counts.group_sent += taken.count;
+    if (taken.failed != 0) { // some of them may have been pending, and were counted as sent
+        counts.group_sent -= taken.failed;
+        counts.group_failed += taken.failed;
+        note_failure(node, by.source(), taken.why);
+    }
     const auto left = lines.substr(taken.bytes);
     counts.group_unsent += static_cast<std::uint64_t>(std::ranges::count(left, '\n'));
     return left.empty();
@@ -161,7 +341,7 @@ bool multicast_group::send(group_port& by, std::string_view line) {
         ++node_->counts.group_unsent;
         return false;
     }
-    return send_to(by, node_->counts, line);
+    return send_to(by, *node_, line);
 }
 
 bool multicast_group::send(std::string_view line) {
@@ -235,9 +415,8 @@ bool multicast_group::take(const group_datagram& datagram, time_point now) {
         ++counts.group_repeated;
     } else {
         ++counts.updates_dropped;
-        if (std::string why;
-            node_->log && !update.body.empty() && !is_valid_json(update.body, detail::answer_depth, &why)) {
-            node_->log_drop(host_text(from), "an update", "its body is no JSON: " + why, true);
+        if (const auto why = node_->log ? why_unreadable(update.body) : std::string{}; !why.empty()) {
+            node_->log_drop(host_text(from), "an update", why, true);
         }
     }
     return true;

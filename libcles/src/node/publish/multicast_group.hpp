@@ -4,9 +4,11 @@
 #include <cles/limits.hpp>
 #include <cles/multicast.hpp>
 
+#include "node/base/deadlines.hpp"
 #include "node/membership/announcement.hpp"
 #include "node/node_state.hpp"
 #include "node/publish/group_feeds.hpp"
+#include "node/publish/group_interfaces.hpp"
 #include "node/publish/group_session.hpp"
 #include "port/environment.hpp"
 #include "port/group_port.hpp"
@@ -17,12 +19,14 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::core {
@@ -86,39 +90,48 @@ class announcement_listener {
     virtual void on_solicitation(bool by_name, time_point now) = 0;
     /// `UPDATE car1:cles seq= epoch= {...}`, perhaps of this node itself. In a secured fleet, it is authentic.
     virtual void on_announcement(heard_announcement heard, time_point now) = 0;
+    /// This node sends to the group by other interfaces, or from other addresses, than before.
+    virtual void on_interfaces_changed(time_point now) { static_cast<void>(now); }
 
   protected:
     ~announcement_listener() = default;
 };
 
 /// Sends whole lines, none of them too large, each as one datagram, and counts them. Returns true if everything has
-/// been sent or is pending.
-bool send_to(group_port& by, counters& counts, std::string_view lines);
+/// been sent or is pending. Those that the system does not send count as failed, and the reason is logged once an hour.
+bool send_to(group_port& by, node_state& node, std::string_view lines);
 
 /// A node's membership in its multicast group: a session on each interface, and what they have in common. The same
 /// update may arrive on several interfaces, and is accepted once.
+///
+/// It follows the interfaces of the host as they come, change and go (`group_interfaces`).
 class multicast_group {
   public:
     /// `owner` is kept while what arrives is processed.
     multicast_group(std::shared_ptr<node_state> host, std::uint32_t seed, std::weak_ptr<void> owner = {});
 
-    /// Joins the group. \throws cles::error: `invalid_url`, `insecure_listen`, or the system's code
+    /// Joins the group, by the interfaces that can be used. If none can, and it is not required, it is joined when one
+    /// comes. The environment must outlive this. \throws cles::error: `invalid_url`, `insecure_listen`, or the system's
+    /// code
     void join(environment& by, const multicast_options& where, bool insecure);
     /// Starts to receive. Call once.
     void start();
     /// Leaves the group and ends the feeds. Idempotent.
     void stop();
     /// The names of the interfaces: "lo, eth0".
-    [[nodiscard]] const std::string& interfaces() const noexcept { return interfaces_; }
+    [[nodiscard]] std::string interfaces() const;
 
-    /// Adds the port of one interface. It must live until nothing is sent or received any more.
+    /// Adds the port of one interface. It must live until it is removed.
     void add(group_port& port) { ports_.push_back(&port); }
+    void remove(const group_port& port) noexcept { std::erase(ports_, &port); }
     [[nodiscard]] const std::vector<group_port*>& ports() const noexcept { return ports_; }
     /// Sends a line, its LF included, as one datagram on that interface. False if it was not sent: it is too large, or
     /// too much is pending. What is not sent is counted.
     bool send(group_port& by, std::string_view line);
     /// The same on each interface. False if it was sent on none.
     bool send(std::string_view line);
+    /// Asks for announcements on each interface, and binds the feeds there.
+    void ask_again();
     /// Whether this node sent it itself: the system loops datagrams back for others on this host, and interfaces in the
     /// same network receive each other's.
     [[nodiscard]] bool is_own(const group_source& from) const noexcept;
@@ -145,9 +158,35 @@ class multicast_group {
     bool take(const group_datagram& datagram, time_point now);
 
   private:
-    void join(environment& by, const network_interface& interface, const multicast_options& where, bool insecure);
-    void join_all(environment& by, const multicast_options& where, bool insecure);
-    void join_automatic(environment& by, const multicast_options& where, bool insecure);
+    /// An interface that it has joined.
+    struct member_interface {
+        member_interface(network_interface by, const std::shared_ptr<node_state>& host, multicast_group& group,
+                         std::shared_ptr<group_port> port, std::uint32_t seed)
+            : where(std::move(by)), session(host, group, std::move(port), seed) {}
+
+        network_interface where;
+        group_session session;
+    };
+    /// Armed when the interfaces are to be compared.
+    struct comparison final : deadline {
+        explicit comparison(multicast_group& all) noexcept : owner(all) {}
+        void on_deadline(time_point now) override { owner.follow_interfaces(now); }
+
+        multicast_group& owner;
+    };
+
+    void join(const network_interface& interface);
+    void join_all();
+    void join_automatic();
+    void watch();
+    void compare_when_due();
+    [[nodiscard]] std::vector<network_interface> list_interfaces() const;
+    void follow_interfaces(time_point now);
+    bool join_later(const network_interface& interface, time_point now);
+    void leave(const network_interface& interface);
+    void ask(group_port& by);
+    void note(log_level level, std::string what) const;
+    void note_left_out(const std::vector<std::string>& names);
     bool take_announcement(const group_datagram& datagram, time_point now);
     [[nodiscard]] bool is_by_its_publisher(const group_datagram& datagram) const noexcept;
     [[nodiscard]] bool is_from_stated_source(const group_datagram& datagram, const announcement& said) const;
@@ -158,8 +197,15 @@ class multicast_group {
     group_feeds feeds_;
     publisher_sources sources_;
     announcement_listener* listener_ = nullptr;
-    std::deque<group_session> sessions_; // its elements do not move
-    std::string interfaces_;
+    environment* environment_ = nullptr; // from `join` on
+    multicast_options where_;
+    bool insecure_ = false;
+    bool started_ = false;
+    std::optional<group_interfaces> chosen_; // until `stop`
+    std::list<member_interface> members_;
+    std::vector<std::string> left_out_; // interfaces, as logged last
+    comparison comparison_{*this};
+    std::shared_ptr<void> watch_;
 };
 
 } // namespace cles::core

@@ -263,6 +263,12 @@ std::optional<protocol::failure> refusal_reason(node_state& n, const identity& p
     return std::nullopt;
 }
 
+std::string why_unreadable(std::string_view body) {
+    std::string why;
+    return body.empty() || is_valid_json(body, detail::answer_depth, &why) ? std::string{}
+                                                                           : "its body is no JSON: " + why;
+}
+
 protocol::failure shutting_down(const node_state& n) {
     return {.code = errc::busy, .message = n.name + " is shutting down", .retry_ms = 1000};
 }

@@ -96,6 +96,9 @@ bool is_local_target(const node_state& n, const protocol::request_line& request)
 std::optional<protocol::failure> refusal_reason(node_state& n, const identity& peer,
                                                 const protocol::request_line& request);
 
+/// Why no reader accepts the body of a reply or an update; empty if one does.
+[[gnu::cold]] std::string why_unreadable(std::string_view body);
+
 /// The reply of a node that shuts down to new requests.
 [[gnu::cold]] protocol::failure shutting_down(const node_state& n);
 

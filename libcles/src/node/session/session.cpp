@@ -28,13 +28,6 @@ bool is_web_datagram(std::string_view datagram) {
     return false;
 }
 
-// Why no reader accepts the body of a reply or an update; empty if one does.
-std::string why_unreadable(std::string_view body) {
-    std::string why;
-    return body.empty() || is_valid_json(body, detail::answer_depth, &why) ? std::string{}
-                                                                           : "its body is no JSON: " + why;
-}
-
 // Whether the peer announces that it leaves: what it has not answered by then, it has not started (docs/protocol.md,
 // "Leaving").
 bool is_leave_notice(const protocol::request_line& r) noexcept {

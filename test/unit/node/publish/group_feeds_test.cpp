@@ -81,11 +81,11 @@ BOOST_AUTO_TEST_CASE(restarted_nodes_are_bound_again_soon_with_one_bind) {
     add(all);
     add(one);
     out.take();
-    feeds.on_new_incarnation("car2", node.clock.now());
-    feeds.on_new_incarnation("car3", node.clock.now());
+    feeds.rebind_soon("car2", node.clock.now());
+    feeds.rebind_soon("car3", node.clock.now());
     node.pass(50ms);
     BOOST_TEST((out.take() == lines{"BIND all:speed lease=10000"}));
-    feeds.on_new_incarnation("car1", node.clock.now());
+    feeds.rebind_soon("car1", node.clock.now());
     node.pass(50ms);
     BOOST_TEST(out.take().size() == 2U);
 }

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
 // A node in a multicast group on two interfaces: what it receives on both, and what it sends on each.
+#include <cles/log.hpp>
+
 #include "node/publish/multicast_group.hpp"
 #include "support/group_recorder.hpp"
 #include "support/hear.hpp"
 #include "support/session_fixture.hpp"
 
+#include <boost/system/error_code.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <string>
 #include <string_view>
@@ -88,6 +92,45 @@ BOOST_AUTO_TEST_CASE(an_interface_that_is_not_writable_does_not_delay_the_other)
     out_card.writable = true;
     on_card.bindings().drain(node.clock.now());
     BOOST_TEST(out_card.take().size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(what_the_system_does_not_send_is_counted_and_logged_once) {
+    std::vector<std::string> logged;
+    cles::test::test_node talking{
+        {}, {}, [&](cles::log_level, const cles::log_entry& entry) { logged.emplace_back(entry.text); }};
+    cles::core::multicast_group shared{talking.host, 1};
+    cles::core::group_session session{talking.host, shared, out_card.share(), 1};
+    shared.send("BIND all:cles\n");
+    out_card.failure = {ENETUNREACH, boost::system::system_category()};
+    for (int i = 0; i < 3; ++i) {
+        shared.send("BIND all:cles\n");
+    }
+    BOOST_TEST(talking.counts().group_sent == 1U);
+    BOOST_TEST(talking.counts().group_failed == 3U);
+    BOOST_TEST(logged == of({"cannot send to the multicast group from 10.0.0.1: " + out_card.failure.message()}),
+               boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(a_session_that_ends_is_not_used_any_more) {
+    {
+        constexpr group_source other{.address = 0x0A000002, .port = 4002};
+        cles::test::group_recorder out_other{other};
+        cles::core::group_session on_other{node.host, group, out_other.share(), 3};
+        BOOST_TEST(group.ports().size() == 3U);
+    }
+    BOOST_TEST(group.ports().size() == 2U);
+    BOOST_TEST(group.send("BIND all:cles\n"));
+}
+
+BOOST_AUTO_TEST_CASE(feeds_are_bound_on_an_interface_that_is_new) {
+    cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
+    group.feeds().add(feed, node.clock.now());
+    out_lo.take();
+    out_card.take();
+    group.feeds().bind_on(out_card);
+    BOOST_TEST(out_lo.take().empty());
+    BOOST_TEST(out_card.take() == of({"BIND all:speed lease=10000"}), boost::test_tools::per_element());
+    group.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_CASE(the_limit_on_leases_is_common) {
