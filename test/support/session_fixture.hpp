@@ -111,13 +111,14 @@ class test_link final : public recording_line_sink, public core::subscriber {
     test_link(test_node& at, std::size_t datagram) : test_link(at, datagram, {}) {}
     /// From a member of the fleet.
     test_link(test_node& at, std::string member) : test_link(at, 0, std::move(member)) {}
-    test_link(test_node& at, std::size_t datagram, std::string member, std::string transport = "tcp")
+    test_link(test_node& at, std::size_t datagram, std::string member, std::string transport = "tcp",
+              bool on_this_host = true)
         : recording_line_sink(datagram, std::make_shared<core::memory_account>(at.host->memory)),
           at_(at), peer_{.transport = std::move(transport),
                          .address = "tcp://127.0.0.1:1",
                          .name = std::move(member),
                          .uid = {},
-                         .local = true},
+                         .local = on_this_host},
           session_(at.host, *this, *this, peer_) {}
 
     /// Receives a line and returns what was sent meanwhile.

@@ -14,6 +14,19 @@
 #include <utility>
 
 namespace cles::core {
+namespace {
+
+/// An endpoint of the sighting at the address from which it was sent; empty if it has none.
+std::string endpoint_at_source(const sighting& w) {
+    for (auto& url : reachable_endpoints(w.announced.endpoints, w.by)) {
+        if (observed_source::at(url).host == w.by.host) {
+            return std::move(url);
+        }
+    }
+    return {};
+}
+
+} // namespace
 
 // -- sightings -----------------------------------------------------------------------------------------------------
 
@@ -257,6 +270,9 @@ bool membership::is_of_ended(const sighting& w) const noexcept {
 }
 
 membership::verdict membership::take_owner_sighting(entries::iterator at, const sighting& w, time_point now) {
+    if (w.is_from_gossip() && !w.is_signed()) {
+        check_new_address(*at, w, now);
+    }
     auto& r = at->second.owner;
     if (!r.is_older_than(w)) {
         if (w.is_from_gossip() && is_hinted_alive(r, w.announced_at)) {
@@ -277,6 +293,10 @@ membership::verdict membership::take_owner_sighting(entries::iterator at, const 
         r.announced.original = w.announced.original;
         end(at, change::left, now);
         return verdict::taken;
+    }
+    if (auto& other = at->second.elsewhere; other && std::ranges::find(w.announced.sources, other->contender.from) !=
+                                                         w.announced.sources.end()) { // its announcement was late
+        other.reset();
     }
     const std::string before{r.where()};
     const bool relinked = w.describes() && r.announced.links != w.announced.links;
@@ -311,26 +331,57 @@ void membership::on_owner_seen(named_entry& one, bool moved, bool by_gossip, tim
     }
 }
 
-// At the address in use, it is a copy. At another one, it may be one too, since an unspecified address stands for the
-// source; but if the owner does not answer any more where it was, it has moved.
+// A newer announcement from a new source: the node may have moved, or the address from which it sends may have changed,
+// which shows if it answers there. Others can only repeat what has arrived, and usually later: at the address in use,
+// that is a copy. At another one, it may be one too, since an unspecified address stands for the source; but if the
+// owner does not answer any more where it was, and does so there, it has moved.
 membership::verdict membership::take_sighting_elsewhere(entries::iterator at, const sighting& w, time_point now) {
     auto& [name, e] = *at;
     const auto is_in_use = [&known = e.owner.endpoints](const std::string& url) {
         return std::ranges::find(known, url) != known.end();
     };
+    const auto there = w.seq > e.owner.seq ? endpoint_at_source(w) : std::string{};
     if (w.announced.leaving || w.seq < e.owner.seq ||
-        std::ranges::all_of(reachable_endpoints(w.announced.endpoints, w.by), is_in_use)) {
+        (there.empty() && std::ranges::all_of(reachable_endpoints(w.announced.endpoints, w.by), is_in_use))) {
         return verdict::copied;
     }
-    auto& other = e.elsewhere;
+    note_elsewhere(*at, w, now);
+    auto& other = *e.elsewhere;
+    if (there.empty()) {
+        conflicts_.check_owner(name, e.owner, other, now);
+    } else if (other.contender.from == w.from) {
+        conflicts_.check_new_source(name, other, there, now);
+    }
+    return verdict::copied;
+}
+
+// Its revisions are not reported to others: it gets one of this table when it takes the owner's place.
+void membership::note_elsewhere(named_entry& one, const sighting& w, time_point now) {
+    auto& other = one.second.elsewhere;
+    auto numbers = revision_;
     if (!other || suspect_at(other->contender) <= now) {
         other = std::make_unique<name_conflict>(
-            name_conflict{incarnation::first(w, revision_), w.announced_at, false, false, {}});
+            name_conflict{incarnation::first(w, numbers), w.announced_at, false, false, {}});
     } else if (other->contender.sends_from(w.from) && other->contender.is_older_than(w)) {
-        other->contender.apply(w, revision_);
+        other->contender.apply(w, numbers);
     }
-    conflicts_.check_owner(name, e.owner, *other, now);
-    return verdict::copied;
+}
+
+// By gossip, entries of one node have different addresses, depending on their paths, so another address does not
+// replace the known one. But if the owner does not answer there any more, and does so at the other one, it has moved.
+void membership::check_new_address(named_entry& one, const sighting& w, time_point now) {
+    auto& [name, e] = one;
+    const auto is_known = [&known = e.owner.endpoints](const std::string& url) {
+        return std::ranges::find(known, url) != known.end();
+    };
+    if (w.announced.leaving || w.seq < e.owner.seq || e.owner.from != group_source{} || e.owner.endpoints.empty()) {
+        return;
+    }
+    const auto said = reachable_endpoints(w.announced.endpoints, w.by);
+    if (!said.empty() && std::ranges::none_of(said, is_known)) {
+        note_elsewhere(one, w, now);
+        conflicts_.check_owner(name, e.owner, *e.elsewhere, now);
+    }
 }
 
 membership::verdict membership::take_own_name_sighting(const sighting& w, time_point now) {
@@ -406,10 +457,11 @@ void membership::on_probed(std::uint64_t ticket, const probe_outcome& found, tim
         if (suspect_at(conflict->contender) <= now) {
             break;
         }
-        if (conflict == at->second.elsewhere.get()) {
+        end(at, change::gone, now);
+        break;
+    case action::owner_moved:
+        if (suspect_at(conflict->contender) > now) {
             succeed(at, std::move(conflict->contender));
-        } else {
-            end(at, change::gone, now);
         }
         break;
     case action::owner_stays: report_conflict(*conflict); break;

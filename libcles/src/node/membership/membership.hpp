@@ -227,6 +227,8 @@ class membership final : private deadline {
     verdict take_sighting(const sighting& w, time_point now);
     verdict take_owner_sighting(entries::iterator at, const sighting& w, time_point now);
     verdict take_sighting_elsewhere(entries::iterator at, const sighting& w, time_point now);
+    void check_new_address(named_entry& one, const sighting& w, time_point now);
+    void note_elsewhere(named_entry& one, const sighting& w, time_point now);
     verdict take_own_name_sighting(const sighting& w, time_point now);
     verdict take_conflicting_sighting(std::unique_ptr<name_conflict>& second, const sighting& w, time_point now);
     verdict take_leave(const sighting& w, time_point now);

@@ -50,9 +50,9 @@ probe_outcome failed_probe(boost::system::error_code code) {
 
 // -- probes --------------------------------------------------------------------------------------------------------
 
-void name_conflicts::probe(name_check& check, name_check::stage stage, const std::string& name,
-                           const incarnation& asked, time_point now) {
-    if (asked.endpoints.empty() || !prober_ || probes_.size() >= max_probes || probe_debt_ > now + probe_burst) {
+void name_conflicts::probe(name_check& check, name_check::stage stage, const std::string& name, std::string_view where,
+                           time_point now) {
+    if (where.empty() || !prober_ || probes_.size() >= max_probes || probe_debt_ > now + probe_burst) {
         return;
     }
     probe_debt_ = std::max(probe_debt_, now) + probe_interval;
@@ -60,21 +60,29 @@ void name_conflicts::probe(name_check& check, name_check::stage stage, const std
     check.asked = now;
     check.ticket = ++last_probe_;
     probes_.emplace(check.ticket, name);
-    const std::string url{asked.where()};
+    const std::string url{where}; // which may change meanwhile
     prober_(check.ticket, url);
 }
 
 void name_conflicts::check_owner(const std::string& name, const incarnation& owner, name_conflict& conflict,
                                  time_point now) {
     if (conflict.check.at == name_check::stage::none) {
-        probe(conflict.check, name_check::stage::owner, name, owner, now);
+        probe(conflict.check, name_check::stage::owner, name, owner.where(), now);
+    }
+}
+
+// Again by each newer one: the last answer may have been lost, and the node may have begun to listen.
+void name_conflicts::check_new_source(const std::string& name, name_conflict& conflict, std::string_view where,
+                                      time_point now) {
+    if (conflict.check.at == name_check::stage::none || conflict.check.at == name_check::stage::over) {
+        probe(conflict.check, name_check::stage::contender, name, where, now);
     }
 }
 
 void name_conflicts::check_own_name(const std::string& name, name_conflict& conflict, time_point now) {
     if (conflict.check.at == name_check::stage::none) {
         conflict.check.owner_began = started_at_;
-        probe(conflict.check, name_check::stage::contender, name, conflict.contender, now);
+        probe(conflict.check, name_check::stage::contender, name, conflict.contender.where(), now);
     }
 }
 
@@ -99,21 +107,26 @@ name_conflicts::action name_conflicts::on_probed(const known_owner& owner, name_
         return action::none;
     }
     const auto stage = std::exchange(check.at, name_check::stage::over);
+    const bool is_owner = conflict.contender.epoch == owner.epoch; // at another address
     if (stage == name_check::stage::owner) {
-        if (found.what == outcome::absent || (found.what == outcome::answered && !is_by(owner.epoch))) {
+        const bool is_gone = found.what == outcome::absent || (found.what == outcome::answered && !is_by(owner.epoch));
+        if (is_gone && !is_owner) {
             return action::owner_gone;
         }
         if (found.what == outcome::answered) {
             check.owner_began = now - found.uptime;
         }
-        if (found.what == outcome::answered && conflict.contender.epoch != owner.epoch) { // otherwise it is the owner
-            probe(check, name_check::stage::contender, owner.name, conflict.contender, now);
+        if (is_owner ? is_gone : found.what == outcome::answered) {
+            probe(check, name_check::stage::contender, owner.name, conflict.contender.where(), now);
         }
         return action::none;
     }
     // The owner is live; `found` is the outcome for the contender.
     if (found.what != outcome::answered || !is_by(conflict.contender.epoch)) {
         return action::none;
+    }
+    if (is_owner) {
+        return action::owner_moved;
     }
     // An owner that was known here before the contender started keeps the name. Otherwise the start times decide.
     const auto began = now - found.uptime;

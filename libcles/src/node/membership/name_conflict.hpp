@@ -74,6 +74,7 @@ class name_conflicts {
         owner_gone,      ///< the name passes to the contender
         owner_stays,     ///< both are live, and the owner keeps the name
         contender_first, ///< both are live, and the name belongs to the contender
+        owner_moved,     ///< the contender is the owner, at another address
     };
 
     /// The owner of a name, as it is known here.
@@ -88,8 +89,11 @@ class name_conflicts {
     /// This node has started.
     void begin(time_point now) noexcept { started_at_ = now; }
 
-    /// The contender of `name` was received: probes the owner, once.
+    /// The contender of `name` was received: probes the owner, once. If the contender is the owner at another address,
+    /// and the owner does not answer at the old one, it is probed there.
     void check_owner(const std::string& name, const incarnation& owner, name_conflict& conflict, time_point now);
+    /// The owner of `name` was received from a new source, by a newer announcement: probes it there, at `where`.
+    void check_new_source(const std::string& name, name_conflict& conflict, std::string_view where, time_point now);
     /// The contender of this node's own name was received: probes it, once. The owner is live.
     void check_own_name(const std::string& name, name_conflict& conflict, time_point now);
     /// The name for which that probe was sent; empty if the ticket is unknown.
@@ -100,8 +104,8 @@ class name_conflicts {
     action on_probed(const known_owner& owner, name_conflict& conflict, const probe_outcome& found, time_point now);
 
   private:
-    /// Probes, unless there are too many probes or the incarnation has no usable address.
-    void probe(name_check& check, name_check::stage stage, const std::string& name, const incarnation& asked,
+    /// Probes, unless there are too many probes or there is no usable address.
+    void probe(name_check& check, name_check::stage stage, const std::string& name, std::string_view where,
                time_point now);
 
     prober prober_;

@@ -4,6 +4,7 @@
 #include <cles/url.hpp>
 
 #include "json/json_members.hpp"
+#include "node/membership/reachable_endpoints.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
 
@@ -35,8 +36,20 @@ void write_signed_entry(json_writer& w, const delta_entry& item, time_point now)
     w.end_object();
 }
 
+// Few nodes have an address that not everybody can use: only their lists are copied.
+void write_endpoints_on_link(json_writer& w, const std::vector<std::string>& all, std::string_view zone,
+                             std::size_t most) {
+    const auto has_zone = [](const std::string& each) { return each.find('%') != std::string::npos; };
+    if (std::ranges::any_of(all, has_zone)) {
+        write_endpoints_member(w, endpoints_on_link(all, zone), most);
+    } else {
+        write_endpoints_member(w, all, most);
+    }
+}
+
 // Another node that has left is only named.
-void write_entry(json_writer& w, const delta_entry& item, time_point now, std::size_t endpoints) {
+void write_entry(json_writer& w, const delta_entry& item, time_point now, std::size_t endpoints,
+                 std::string_view zone) {
     if (item.original != nullptr) {
         write_signed_entry(w, item, now);
         return;
@@ -49,7 +62,7 @@ void write_entry(json_writer& w, const delta_entry& item, time_point now, std::s
         if (!said->pool.empty()) {
             write_member(w, "pool", said->pool);
         }
-        write_endpoints_member(w, *item.endpoints, endpoints);
+        write_endpoints_on_link(w, *item.endpoints, zone, endpoints);
     }
     write_member(w, "epoch", protocol::epoch_text(item.epoch));
     if (item.seq != 0) {
@@ -120,7 +133,7 @@ void write_route(json_writer& w, std::uint32_t epoch, const route_advert& how) {
 }
 
 page page_of(const std::vector<delta_entry>& items, std::uint64_t latest, std::size_t longest,
-             const route_function& route_of, time_point now) {
+             const route_function& route_of, std::string_view zone, time_point now) {
     page p;
     json_writer peers{p.peers}; // both write after the opening bracket
     json_writer beats{p.beats};
@@ -133,7 +146,7 @@ page page_of(const std::vector<delta_entry>& items, std::uint64_t latest, std::s
         if (item.what == delta_entry::kind::heartbeat) {
             write_heartbeat(beats, item, now);
         } else {
-            write_entry(peers, item, now, max_endpoints);
+            write_entry(peers, item, now, max_endpoints, zone);
         }
         if (const auto route = route_of ? route_of(item) : std::nullopt) {
             write_route(routes, item.epoch, *route);
@@ -151,7 +164,7 @@ page page_of(const std::vector<delta_entry>& items, std::uint64_t latest, std::s
             // Not even one entry fits: it is written with fewer endpoints.
             for (auto count = item.endpoints->size(); p.size() > longest && count-- > 0;) {
                 p.peers.resize(peers_before);
-                write_entry(peers, item, now, count);
+                write_entry(peers, item, now, count, zone);
             }
         }
         p.next = item.revision;
@@ -329,7 +342,7 @@ void write_delta(json_writer& w, const table_owner& who, const membership& other
     describe(items, others, asked.describe, sent);
     const auto available = std::min(longest, table_page);
     const auto for_items = available > bytes_for_head ? available - bytes_for_head : 0;
-    const auto p = page_of(items, others.latest_revision(), for_items, route_of, now);
+    const auto p = page_of(items, others.latest_revision(), for_items, route_of, asked.zone, now);
     w.begin_object();
     write_owner(w, who, others.pool());
     w.plain_key("peers");
@@ -352,7 +365,7 @@ void write_own_entry(json_writer& w, const incarnation& own, time_point now) {
     w.plain_key("peers");
     w.begin_array();
     write_entry(w, delta_entry::of(delta_entry::kind::description, own.announced.node, own, peer_state::live), now,
-                max_endpoints);
+                max_endpoints, {});
     w.end_array();
     w.end_object();
 }

@@ -30,11 +30,12 @@ inline constexpr std::size_t table_page = 32 * 1024;
 /// The maximum number of entries that count in a table sent without a request.
 inline constexpr std::size_t max_pushed_entries = 64;
 
-/// The adverbs of `PULL self:cles/peers since=... describe=... routes=...`.
+/// The adverbs of `PULL self:cles/peers since=... describe=... routes=...`, and who asks.
 struct table_question {
     std::string_view since;
     std::string_view describe{}; ///< epochs, separated by commas
     protocol::routes_question routes{};
+    std::string_view zone{}; ///< of the link to the node that asks, if that is at a link-local IPv6 address
 };
 
 /// The node that replies.

@@ -15,7 +15,7 @@ namespace cles::core {
 namespace {
 
 /// The kinds of IP addresses that are treated differently.
-enum class host_kind { none, ordinary, unspecified, loopback };
+enum class host_kind { none, ordinary, unspecified, loopback, link_local };
 
 // A scope, or an IPv4 address written within an IPv6 address, means nothing to other hosts.
 host_kind kind_of(std::string_view host) noexcept {
@@ -34,9 +34,18 @@ host_kind kind_of(std::string_view host) noexcept {
         return bytes[0] == 127 ? host_kind::loopback : bytes[0] < 224 ? host_kind::ordinary : host_kind::none;
     }
     if (!is_zero(0, 10)) {
-        return bytes[0] == 0xFF ? host_kind::none : host_kind::ordinary;
+        const bool is_link_local = bytes[0] == 0xFE && (bytes[1] & 0xC0U) == 0x80;
+        return bytes[0] == 0xFF ? host_kind::none : is_link_local ? host_kind::link_local : host_kind::ordinary;
     }
     return is_zero(10, 15) && bytes[15] == 1 ? host_kind::loopback : host_kind::none; // else an embedded IPv4 address
+}
+
+constexpr std::string_view zone_mark = "%25"; // in a URL
+
+// "eth0" of "fe80::1%eth0"; empty if there is none.
+std::string_view zone_of(std::string_view host) noexcept {
+    const auto at = host.find('%');
+    return at == std::string_view::npos ? std::string_view{} : host.substr(at + 1);
 }
 
 struct place {
@@ -83,6 +92,18 @@ bool put_in_host(url& where, const observed_source& from) {
     return true;
 }
 
+// A link-local address of another host is one of the link by which the sender is reached. Fails if that is unknown.
+bool put_on_link(url& where, const observed_source& from) {
+    if (kind_of(where.host) != host_kind::link_local) {
+        return true;
+    }
+    const auto zone = zone_of(from.host);
+    if (!zone.empty()) {
+        where.host.append("%").append(zone);
+    }
+    return !zone.empty();
+}
+
 std::optional<place> place_of(std::string_view endpoint, const observed_source& from) {
     auto where = usable_url(endpoint);
     if (!where) {
@@ -93,7 +114,7 @@ std::optional<place> place_of(std::string_view endpoint, const observed_source& 
     }
     const auto kind = kind_of(where->host);
     if (kind == host_kind::none || where->port == 0 || (kind == host_kind::loopback && !from.local) ||
-        !put_in_host(*where, from)) {
+        !put_in_host(*where, from) || !put_on_link(*where, from)) {
         return {};
     }
     return place{to_string(*where), rank_of(*where, from.host)};
@@ -130,12 +151,31 @@ std::vector<std::string> endpoints_to_relay(const std::vector<std::string>& anno
         }
         const auto kind = kind_of(where->host);
         if (!stays_on_host(where->scheme) && kind != host_kind::none && kind != host_kind::loopback &&
-            put_in_host(*where, from)) {
+            put_in_host(*where, from) && put_on_link(*where, from)) {
             result.push_back(to_string(*where));
         }
     }
     return result;
 }
+
+std::vector<std::string> endpoints_on_link(const std::vector<std::string>& relayed, std::string_view zone) {
+    std::vector<std::string> result;
+    for (const auto& each : relayed) {
+        const auto begin = each.find(zone_mark);
+        const auto end = begin == std::string::npos ? begin : each.find(']', begin);
+        if (end == std::string::npos) { // it has none; the path of a Unix socket may look alike
+            result.push_back(each);
+            continue;
+        }
+        const auto name = begin + zone_mark.size();
+        if (!zone.empty() && std::string_view{each}.substr(name, end - name) == zone) {
+            result.push_back(std::string{each}.erase(begin, end - begin));
+        }
+    }
+    return result;
+}
+
+std::string observed_source::zone() const { return std::string{zone_of(host)}; }
 
 observed_source observed_source::of(const identity& peer) {
     auto found = at(peer.address);

@@ -17,6 +17,9 @@ struct observed_source {
     bool local = false; ///< this host: its loopback addresses and Unix sockets are usable
     std::string name{}; ///< of the member at the other end of the link; empty: not proven
 
+    /// The name of the link, if that is a link-local IPv6 address; otherwise empty.
+    [[nodiscard]] std::string zone() const;
+
     static observed_source of(const group_source& from) { return {host_text(from), from.is_loopback()}; }
     /// The other end of a link.
     static observed_source of(const identity& peer);
@@ -34,14 +37,20 @@ std::string holder_of(const identity& peer);
 ///
 /// An unspecified address stands for where the announcement came from. Omitted are: `inproc`; Unix sockets and loopback
 /// addresses, unless the announcement came over loopback and so from this host; and everything that is not an IP
-/// address, since an announcement must not cause name lookups.
+/// address, since an announcement must not cause name lookups. A link-local IPv6 address is usable if the announcement
+/// came from one: it is taken for an address on the same link.
 ///
 /// Streams come before datagrams: `tcp`, then `unix` (whose permissions may exclude this process), then `udp`, then
 /// unknown schemes. Among equals, the address that the announcement came from comes first, then the announced order.
 std::vector<std::string> reachable_endpoints(const std::vector<std::string>& announced, const observed_source& from);
 
 /// The announced endpoints as reported to other nodes: those that are of no use to them are omitted, and unspecified
-/// addresses are replaced by the sender's host, unless that is this host.
+/// addresses are replaced by the sender's host, unless that is this host. Link-local addresses have the zone of the
+/// link on this host.
 std::vector<std::string> endpoints_to_relay(const std::vector<std::string>& announced, const observed_source& from);
+
+/// Those as they are told to a node that is connected by the link of that zone, or, if it is empty, in another way:
+/// link-local addresses of that link without their zone, which means nothing to others, and none of other links.
+std::vector<std::string> endpoints_on_link(const std::vector<std::string>& relayed, std::string_view zone);
 
 } // namespace cles::core

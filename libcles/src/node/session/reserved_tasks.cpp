@@ -75,13 +75,14 @@ std::string own_metrics(const node_state& n) {
     return is_valid_json(text, n.bounds.depth) ? text.substr(1, text.size() - 2) : std::string{};
 }
 
-void serve_peers(node_state& host, reply_writer& replies, const protocol::request_line& r) {
+void serve_peers(node_state& host, reply_writer& replies, const protocol::request_line& r, const identity& peer) {
     const auto now = host.time.now();
+    const auto zone = observed_source::of(peer).zone();
     replies.write(r, [&](json_writer& w) {
         if (r.since.empty() || host.gossip_responder == nullptr) {
             write_peers(w, host.list_peers(now), host.peers.pool());
         } else {
-            host.gossip_responder->write_delta(w, {r.since, r.describe, r.routes}, replies.longest(), now);
+            host.gossip_responder->write_delta(w, {r.since, r.describe, r.routes, zone}, replies.longest(), now);
         }
     });
 }
@@ -189,7 +190,7 @@ void serve_reserved(node_state& host, reply_writer& replies, const protocol::req
     } else if (is(verb::pull, "cles/metrics")) {
         replies.write(r, [&](json_writer& w) { write_metrics(w, host); });
     } else if (is(verb::pull, "cles/peers")) {
-        serve_peers(host, replies, r);
+        serve_peers(host, replies, r, peer);
     } else if (is(verb::push, "cles/peers") && host.gossip_responder != nullptr) {
         if (host.gossip_responder->on_pushed_table(r.body, observed_source::of(peer), host.time.now())) {
             replies.done(reply_target{r}, {});

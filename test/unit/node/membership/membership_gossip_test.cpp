@@ -6,7 +6,9 @@
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
+#include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -307,6 +309,55 @@ BOOST_AUTO_TEST_CASE(nodes_beyond_the_limit_are_refused) {
         apply(report("car" + std::to_string(i), i, 1, 0ms));
     }
     BOOST_TEST((apply(report("car6", 6, 1, 0ms)) == verdict::refused));
+}
+
+// -- another address -----------------------------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(a_node_that_has_another_address_is_asked_for_there) {
+    std::vector<std::string> asked;
+    std::uint64_t last = 0;
+    table.set_prober([&](std::uint64_t ticket, std::string_view url) {
+        last = ticket;
+        asked.emplace_back(url);
+    });
+    const auto answers = [&](std::uint32_t epoch) {
+        table.on_probed(last, {cles::core::probe_outcome::kind::answered, "car1", epoch, 1s}, clock.now());
+    };
+    const auto is_absent = [&] {
+        table.on_probed(last, {.what = cles::core::probe_outcome::kind::absent}, clock.now());
+    };
+    apply(report("car1", 1, 7, 0ms));
+    apply(report("car1", 1, 8, 0ms, "tcp://10.0.0.77:1")); // on this path, it has another one
+    check(asked, {"tcp://10.0.0.9:1"});
+    answers(1);
+    pass(1s);
+    apply(report("car1", 1, 9, 0ms, "tcp://10.0.0.77:1"));
+    BOOST_TEST(asked.size() == 1U);
+    BOOST_TEST(where("car1") == "tcp://10.0.0.9:1");
+
+    for (std::uint64_t seq = 10; seq < 15; ++seq) { // the other path has ended
+        pass(1s);
+        apply(report("car1", 1, seq, 0ms));
+    }
+    apply(report("car1", 1, 15, 0ms, "tcp://10.0.0.78:1")); // and now its address has changed
+    BOOST_REQUIRE(asked.size() == 2U);
+    is_absent();
+    check({asked.begin() + 1, asked.end()}, {"tcp://10.0.0.9:1", "tcp://10.0.0.78:1"});
+    BOOST_TEST(where("car1") == "tcp://10.0.0.9:1");
+    answers(1);
+    BOOST_TEST(where("car1") == "tcp://10.0.0.78:1");
+    BOOST_TEST(list().size() == 1U);
+    BOOST_TEST((deltas().back().what == delta_entry::kind::description)); // others learn of it
+    BOOST_TEST(deltas().back().endpoints->front() == "tcp://10.0.0.78:1");
+}
+
+BOOST_AUTO_TEST_CASE(an_older_entry_with_another_address_is_no_reason_to_ask) {
+    std::vector<std::string> asked;
+    table.set_prober([&](std::uint64_t, std::string_view url) { asked.emplace_back(url); });
+    apply(report("car1", 1, 7, 0ms));
+    apply(report("car1", 1, 6, 0ms, "tcp://10.0.0.77:1"));
+    apply(report("car1", 1, 8, 0ms, "unix://@car1")); // of no use here
+    BOOST_TEST(asked.empty());
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/membership/peer_table.hpp"
+#include "node/membership/reachable_endpoints.hpp"
 #include "support/manual_clock.hpp"
 
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace peer_table {
@@ -281,6 +283,31 @@ BOOST_AUTO_TEST_CASE(number_of_entries_is_bounded) {
     read(text + "]}");
     BOOST_TEST(good);
     BOOST_TEST(reports.size() == 100U);
+}
+
+BOOST_AUTO_TEST_CASE(link_local_addresses_are_told_to_those_on_the_link) {
+    const auto by_link = cles::core::observed_source::at("tcp://[fe80::bb%25eth1]:1");
+    const peer_report report{.announced = make_announcement("car1", "tcp://[::]:1"), .epoch = 1, .seq = 7};
+    table.apply_gossip(report, by_link, clock.now(), clock.now());
+    BOOST_TEST(*table.address_of("car1") == "tcp://[fe80::bb%25eth1]:1");
+    const auto told_to = [&](std::string_view zone) {
+        std::string out;
+        cles::json_writer w{out};
+        write_delta(w, {"me", "0000aaaa"}, table, {.since = "0", .zone = zone}, 1U << 20U, clock.now());
+        read(out);
+        BOOST_REQUIRE(reports.size() == 1U);
+        return reports.front().announced.endpoints;
+    };
+    BOOST_TEST(told_to("eth1") == (std::vector<std::string>{"tcp://[fe80::bb]:1"}), boost::test_tools::per_element());
+    BOOST_TEST(told_to("eth0").empty());
+    BOOST_TEST(told_to({}).empty());
+
+    // Another node, which reaches this one by a link of another name.
+    told_to("eth1");
+    cles::core::membership other{"other", 0xBBBB, deadlines, 100};
+    other.apply_gossip(reports.front(), cles::core::observed_source::at("tcp://[fe80::aa%25wlan0]:1"), clock.now(),
+                       clock.now());
+    BOOST_TEST(*other.address_of("car1") == "tcp://[fe80::bb%25wlan0]:1");
 }
 
 BOOST_AUTO_TEST_CASE(own_entry_is_written) {

@@ -105,6 +105,28 @@ BOOST_AUTO_TEST_CASE(unspecified_ipv4_address_needs_an_ipv4_source) {
     check(usable({"tcp://0.0.0.0:1"}, observed_source{}), {});
 }
 
+BOOST_AUTO_TEST_CASE(link_local_addresses_are_those_of_the_link_by_which_they_came) {
+    const auto by_link = observed_source::at("tcp://[fe80::aa%25eth1]:25370");
+    BOOST_TEST(by_link.zone() == "eth1");
+    BOOST_TEST(other_host.zone().empty());
+    check(usable({"tcp://[fe80::bb]:1", "tcp://[::]:2"}, by_link),
+          {"tcp://[fe80::aa%25eth1]:2", "tcp://[fe80::bb%25eth1]:1"});
+    check(usable({"tcp://[fe80::bb%25eth0]:1"}, by_link), {});
+    check(usable({"tcp://[fe80::bb]:1", "tcp://[febf::1]:1"}, other_host), {});
+    check(usable({"tcp://[fe80::bb]:1"}, loopback), {});
+}
+
+BOOST_AUTO_TEST_CASE(link_local_addresses_are_told_on_their_link_without_its_name) {
+    const auto by_link = observed_source::at("tcp://[fe80::aa%25eth1]:25370");
+    const auto relayed = relayed_endpoints({"tcp://[::]:1", "tcp://[fe80::bb]:2", "tcp://10.0.0.9:3"}, by_link);
+    check(relayed, {"tcp://[fe80::aa%25eth1]:1", "tcp://[fe80::bb%25eth1]:2", "tcp://10.0.0.9:3"});
+    check(cles::core::endpoints_on_link(relayed, "eth1"),
+          {"tcp://[fe80::aa]:1", "tcp://[fe80::bb]:2", "tcp://10.0.0.9:3"});
+    for (const auto* zone : {"", "eth", "eth10"}) {
+        check(cles::core::endpoints_on_link(relayed, zone), {"tcp://10.0.0.9:3"});
+    }
+}
+
 BOOST_AUTO_TEST_CASE(relayed_endpoints_mean_the_same_to_the_next_node) {
     const strings all{"tcp://0.0.0.0:1", "tcp://127.0.0.1:2", "unix://@a", "inproc://a", "udp://10.0.0.9:3", "nothing"};
     check(relayed_endpoints(all, other_host), {"tcp://10.0.0.7:1", "udp://10.0.0.9:3"});

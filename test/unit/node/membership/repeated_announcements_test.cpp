@@ -122,14 +122,78 @@ BOOST_AUTO_TEST_CASE(an_unspecified_address_in_a_copy_is_another_one_but_no_conf
 }
 
 BOOST_AUTO_TEST_CASE(if_the_node_does_not_answer_at_the_address_of_a_copy_the_other_one_counts) {
-    receive(1, 1, repeater, "tcp://0.0.0.0:1"); // the first was lost
-    receive(1, 2, here, "tcp://0.0.0.0:1");
+    receive(1, 1, repeater, "tcp://0.0.0.0:1"); // repeated before it arrived
+    receive(1, 1, here, "tcp://0.0.0.0:1");
     check(asked, {"tcp://10.0.0.9:1"});
     is_absent();
+    check(asked, {"tcp://10.0.0.9:1", "tcp://10.0.0.7:1"});
+    BOOST_TEST(where("car1") == "tcp://10.0.0.9:1");
+    answers(1);
     BOOST_TEST(where("car1") == "tcp://10.0.0.7:1");
     pass(1s);
     BOOST_TEST((receive(1, 3, here, "tcp://0.0.0.0:1") == verdict::taken));
     BOOST_TEST(list().size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_answers_nowhere_stays_where_it_was) {
+    receive(1, 1, here, "tcp://0.0.0.0:1");
+    receive(1, 1, repeater, "tcp://0.0.0.0:1");
+    is_absent();
+    is_absent();
+    BOOST_TEST(where("car1") == "tcp://10.0.0.7:1");
+}
+
+BOOST_AUTO_TEST_CASE(a_node_with_a_new_source_counts_when_it_answers_there) {
+    receive(1, 1, here, "tcp://0.0.0.0:1");
+    pass(1s);
+    BOOST_TEST((receive(1, 2, there, "tcp://0.0.0.0:1") == verdict::copied)); // its address has changed
+    check(asked, {"tcp://10.0.0.8:1"});
+    answers(1);
+    BOOST_TEST(where("car1") == "tcp://10.0.0.8:1");
+    BOOST_TEST(table.announced("car1")->sends_from(there));
+    BOOST_TEST(!table.announced("car1")->sends_from(here));
+    BOOST_TEST((receive(1, 3, there, "tcp://0.0.0.0:1") == verdict::taken));
+    check(changes, {"car1 appeared tcp://10.0.0.7:1", "car1 moved tcp://10.0.0.8:1"});
+}
+
+BOOST_AUTO_TEST_CASE(a_node_with_another_port_at_its_address_counts_when_it_answers_there) {
+    constexpr group_source again{here.address, 50000}; // it has joined the group anew
+    receive(1, 1, here);
+    pass(1s);
+    receive(1, 2, again);
+    check(asked, {"tcp://10.0.0.7:1"});
+    answers(1);
+    BOOST_TEST((receive(1, 3, again) == verdict::taken));
+    BOOST_TEST(where("car1") == "tcp://10.0.0.7:1");
+}
+
+BOOST_AUTO_TEST_CASE(a_new_source_where_another_node_answers_does_not_count) {
+    receive(1, 1, here, "tcp://0.0.0.0:1");
+    receive(1, 2, repeater, "tcp://0.0.0.0:1");
+    answers(7);
+    BOOST_TEST(where("car1") == "tcp://10.0.0.7:1");
+    receive(1, 3, repeater, "tcp://0.0.0.0:1"); // it may listen by now
+    is_absent();
+    BOOST_TEST(asked.size() == 2U);
+    BOOST_TEST(where("car1") == "tcp://10.0.0.7:1");
+    BOOST_TEST((receive(1, 4, here, "tcp://0.0.0.0:1") == verdict::taken));
+}
+
+BOOST_AUTO_TEST_CASE(a_new_source_that_states_another_address_is_not_asked_there) {
+    receive(1, 1, here);
+    receive(1, 2, repeater); // with the address of the node, which would answer
+    BOOST_TEST(asked.empty());
+    BOOST_TEST(!table.announced("car1")->sends_from(repeater));
+}
+
+BOOST_AUTO_TEST_CASE(a_new_source_that_the_old_one_states_makes_no_move) {
+    receive(1, 1, here, "tcp://0.0.0.0:1");
+    receive(1, 2, there, "tcp://0.0.0.0:1"); // by an interface that it has joined now
+    table.apply_announcement({.node = "car1", .endpoints = {"tcp://0.0.0.0:1"}, .sources = {here, there}}, 1, 2, here,
+                             clock.now());
+    answers(1);
+    BOOST_TEST(where("car1") == "tcp://10.0.0.7:1");
+    BOOST_TEST(table.announced("car1")->sends_from(there));
 }
 
 BOOST_AUTO_TEST_CASE(another_node_is_a_conflict_also_while_copies_arrive) {
