@@ -546,6 +546,18 @@ BOOST_AUTO_TEST_CASE(a_feed_that_joins_gets_nothing_older_than_its_current_value
     run_until(at.io, [&] { return third.bound; });
 }
 
+BOOST_AUTO_TEST_CASE(a_feed_that_wants_marks_knows_which_update_its_current_value_is) {
+    joined at{R"(["mark"])", cles::bind_options{}.mark()};
+    at.publisher->send(id_of(at.asked_again) + " seq=10 epoch=0000000a " + value(10) + "\n" +
+                       update(11, "0000000a", 11));
+    run_until(at.io, [&] { return at.two.bodies().size() == 1; });
+    BOOST_REQUIRE(at.two.items.size() == 2U);
+    BOOST_TEST(at.two.items.front().seq == 10U);
+    BOOST_TEST(at.two.items.front().epoch == 10U);
+    BOOST_TEST(at.two.items.back().seq == 11U);
+    BOOST_TEST(at.two.items.back().epoch == 10U);
+}
+
 BOOST_AUTO_TEST_CASE(a_feed_that_joins_and_is_refused_leaves_the_other_bound) {
     joined at{"[]"};
     BOOST_TEST(at.asked_again.find(" mark=yes") == std::string::npos, at.asked_again);

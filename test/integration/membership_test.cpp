@@ -429,7 +429,9 @@ BOOST_FIXTURE_TEST_CASE(what_is_malformed_is_counted_and_otherwise_without_effec
     BOOST_TEST(pulled(asker, "self:cles/metrics").text.find(R"("announcements_dropped":2)") != std::string::npos);
     const auto nowhere = pulled(asker, "car3:who");
     BOOST_TEST((nowhere.code == errc::no_target));
-    BOOST_TEST(nowhere.why == "asker cannot find 'car3': it has announced no address that is reachable from here");
+    BOOST_TEST(nowhere.why ==
+               "asker cannot find 'car3': it has announced no address that is reachable from here; state its URL "
+               "in 'peers', or in 'links' a node that reaches it");
 }
 
 BOOST_FIXTURE_TEST_CASE(past_the_limit_nodes_are_passed_over, fixture) {

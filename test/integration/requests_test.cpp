@@ -10,6 +10,7 @@
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
 
+#include <boost/asio/awaitable.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/describe.hpp>
 #include <boost/test/unit_test.hpp>
@@ -20,6 +21,7 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 BOOST_AUTO_TEST_SUITE(requests)
@@ -36,6 +38,12 @@ struct chain {
     std::vector<chain> next{};
 };
 BOOST_DESCRIBE_STRUCT(chain, (), (next))
+
+struct reading {
+    double value = 0;
+};
+BOOST_DESCRIBE_STRUCT(reading, (), (value))
+using reading_or_number = std::variant<reading, double>;
 
 // Two services, one of which serves a task for every verb.
 struct two_nodes {
@@ -92,6 +100,60 @@ CLES_DATA_TEST_CASE(a_command_whose_body_has_several_lines_is_sent_as_one, carri
     n.tower.async_request("PULL car1:cles/metrics", counted.take());
     n.wait_for(counted);
     BOOST_TEST(counted.value.text.find("\"errors\":0,") != std::string::npos, counted.value.text);
+}
+
+BOOST_AUTO_TEST_CASE(the_whole_failure_is_received_where_that_is_wanted) {
+    two_nodes n{carrier::inproc};
+    n.car.on_pull("later", [](const cles::request&, const cles::responder& to) { to.refuse("not now", 250ms); });
+    std::string failure;
+    answer<cles::json_text> asked;
+    n.tower.async_pull("car1:later", cles::call_options{}.failure(failure), asked.take());
+    n.wait_for(asked);
+    BOOST_TEST((asked.code == errc::busy));
+    BOOST_TEST(failure.starts_with(R"({"error":"busy")"), failure);
+    BOOST_TEST(failure.find(R"("retry_ms":250)") != std::string::npos, failure);
+}
+
+// Both are {"value":5} as JSON, in every way in which a value is sent.
+BOOST_AUTO_TEST_CASE(an_object_that_looks_like_a_scalar_is_received_as_what_it_was) {
+    two_nodes n{carrier::inproc};
+    const reading_or_number made = reading{5};
+    n.car.on_pull("plain", [made] { return made; });
+    n.car.on_pull("later", [made](const cles::request&, const cles::responder& to) { to.done(made); });
+    n.car.on_pull("coroutine", [made]() -> boost::asio::awaitable<reading_or_number> { co_return made; });
+    n.car.on_push("same", [](const reading_or_number& sent) { return sent; });
+    for (const std::string task : {"plain", "later", "coroutine"}) {
+        answer<reading_or_number> pulled;
+        n.tower.async_pull<reading_or_number>("car1:" + task, pulled.take());
+        n.wait_for(pulled);
+        BOOST_TEST(!pulled.code, task);
+        BOOST_TEST(pulled.value.index() == 0U, task);
+    }
+    for (const auto& sent : {made, reading_or_number{5.0}}) {
+        answer<reading_or_number> same;
+        n.tower.async_push<reading_or_number>("car1:same", sent, same.take());
+        n.wait_for(same);
+        BOOST_TEST(same.value.index() == sent.index());
+    }
+
+    n.car.update("either", made);
+    answer<cles::feed<reading_or_number>> bound;
+    n.tower.async_bind<reading_or_number>("car1:either", bound.take());
+    n.wait_for(bound);
+    const auto next_index = [&] {
+        answer<cles::feed_item<reading_or_number>> next;
+        bound.value.async_next(next.take());
+        n.wait_for(next);
+        return next.value.value.index();
+    };
+    BOOST_TEST(next_index() == 0U);
+    answer<void> updated;
+    n.car.async_update("either", made, updated.take());
+    BOOST_TEST(next_index() == 0U);
+    n.car.make_publisher().update("either", made);
+    BOOST_TEST(next_index() == 0U);
+    n.car.update("either", reading_or_number{5.0});
+    BOOST_TEST(next_index() == 1U);
 }
 
 CLES_DATA_TEST_CASE(a_result_that_no_requester_would_read_fails_at_once, carriers, kind) {

@@ -13,10 +13,13 @@
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/deferred.hpp>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/io_context.hpp>
 #include <boost/asio/strand.hpp>
 #include <boost/asio/use_future.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <exception>
 #include <future>
@@ -239,6 +242,30 @@ BOOST_AUTO_TEST_CASE(the_blocking_form_inside_a_handler_would_deadlock) {
     BOOST_TEST(foolish.code == errc::failed);
     BOOST_TEST(!caught.code);
     BOOST_TEST(seen == "would_deadlock");
+}
+
+// Another thread may take what the call waits for. In either case the call ends, and soon it is refused.
+BOOST_AUTO_TEST_CASE(the_blocking_form_is_refused_while_another_thread_runs_the_context) {
+    asio::io_context io;
+    cles::service tower{io, {.name = "tower"}};
+    const auto work = asio::make_work_guard(io);
+    std::thread other{[&] { io.run(); }};
+    bool is_refused = false;
+    std::chrono::steady_clock::duration longest{};
+    for (int i = 0; i < 1000 && !is_refused; ++i) {
+        const auto begun = std::chrono::steady_clock::now();
+        try {
+            tower.request("PULL self:cles");
+        } catch (const cles::error& e) {
+            is_refused = e.code() == errc::would_deadlock && e.message().starts_with("another thread runs");
+            BOOST_TEST(is_refused, e.what());
+        }
+        longest = std::max(longest, std::chrono::steady_clock::now() - begun);
+    }
+    BOOST_TEST((longest < 2s)); // not at the deadline of the request
+    BOOST_TEST(is_refused);
+    io.stop();
+    other.join();
 }
 
 BOOST_AUTO_TEST_CASE(the_blocking_form_needs_a_context_that_it_can_run) {

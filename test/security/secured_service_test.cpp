@@ -107,6 +107,25 @@ BOOST_AUTO_TEST_CASE(another_member_does_not_pass_for_the_one_that_is_meant) {
     BOOST_TEST(contains(outcome, "cannot connect"), outcome);
 }
 
+BOOST_AUTO_TEST_CASE(at_an_address_only_the_node_that_is_stated_may_answer) {
+    const auto where = car1.endpoints().front();
+    const auto outcome = [&](const std::string& command, const std::string& node) {
+        std::string why;
+        std::optional<boost::system::error_code> code;
+        car2.async_request(command, cles::call_options{}.at(where, node).diagnostics(why),
+                           [&](boost::system::error_code failed, const cles::json_text&) { code = failed; });
+        cles::test::run_until(io, [&] { return code.has_value(); });
+        return *code ? code->message() + ": " + why : std::string{};
+    };
+    for (const std::string node : {"", "car1"}) {
+        BOOST_TEST(outcome("PULL self:speed", node) == "");
+    }
+    // A node that asks the one whose key it uses: the name alone would lead to itself.
+    const auto other = outcome("PULL car2:speed", "car2");
+    BOOST_TEST(contains(other, "cannot connect"), other);
+    BOOST_TEST(outcome("PULL self:speed", "car1") == "");
+}
+
 BOOST_AUTO_TEST_CASE(plain_links_are_refused) {
     BOOST_CHECK_EXCEPTION(car1.listen("tcp://127.0.0.1:0"), cles::error,
                           [](const cles::error& e) { return e.code() == errc::insecure_listen; });

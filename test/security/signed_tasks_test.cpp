@@ -108,6 +108,24 @@ struct discovered : fixture {
     cles::multicast_options where = cles::test::fresh_group();
 };
 
+/// sat1 forwards for car2 to car1. No node announces itself.
+struct unannounced : fixture {
+    [[nodiscard]] cles::service_options forwarding() const {
+        auto made = fleet.knowing("sat1", car1);
+        made.routing = cles::routing();
+        return made;
+    }
+    [[nodiscard]] cles::bind_options by_sat1() const {
+        cles::bind_options made;
+        made.at(sat1.endpoints().front());
+        return made;
+    }
+
+    cles::service car1{io, fleet.options("car1")};
+    cles::service sat1{io, forwarding()};
+    cles::service car2{io, fleet.options("car2")};
+};
+
 /// Collects the values of a feed.
 struct collector {
     explicit collector(cles::service& by, const std::string& noun, cles::bind_options options = {}) {
@@ -420,6 +438,50 @@ BOOST_FIXTURE_TEST_CASE(a_forwarded_value_without_signature_counts_as_missing, d
     BOOST_TEST(forwarded.values.front() == 2);
     for (auto* each : {&direct, &forwarded, &other}) {
         each->feed.close();
+    }
+}
+
+BOOST_FIXTURE_TEST_CASE(they_are_received_without_an_announcement, unannounced) {
+    car1.on_bind("control", must_be_signed);
+    car1.update("control", 1);
+    car1.update("pose", 1);
+    collector control{car2, "car1:control", by_sat1()};
+    collector pose{car2, "car1:pose", by_sat1()};
+    cles::test::run_until(io, [&] { return control.feed.is_open() && pose.values.size() == 1; });
+    BOOST_TEST(control.values.empty()); // that value is not signed
+    int value = 1;
+    cles::test::run_until(io, [&] {
+        ++value;
+        car1.update("control", value);
+        car1.update("pose", value);
+        return control.values.size() > 3 && pose.values.size() > 3;
+    });
+    BOOST_TEST(unsigned_updates(io, sat1) == 0U);
+    BOOST_TEST(unsigned_updates(io, car2) == 0U);
+    control.feed.close();
+    pose.feed.close();
+}
+
+// The link does not prove which node listens there.
+BOOST_FIXTURE_TEST_CASE(they_are_received_at_a_unix_socket, fixture) {
+    auto options = fleet.options("car1");
+    options.listen = {"unix://" + fleet.directory_of("car1") + "/socket"};
+    cles::service car1{io, std::move(options)};
+    car1.on_bind("control", must_be_signed);
+    cles::bind_options there;
+    there.at(car1.endpoints().front());
+    for (const std::string target : {"car1", "self"}) {
+        BOOST_TEST_CONTEXT(target) {
+            cles::service car2{io, fleet.options("car2")};
+            collector seen{car2, target + ":control", there};
+            int value = 0;
+            cles::test::run_until(io, [&] {
+                car1.update("control", ++value);
+                return seen.values.size() > 3;
+            });
+            BOOST_TEST(unsigned_updates(io, car2) == 0U);
+            seen.feed.close();
+        }
     }
 }
 

@@ -126,6 +126,8 @@ class test_link final : public recording_line_sink, public core::subscriber {
         session_.on_line(line, at_.clock.now());
         return take();
     }
+    /// How often publishers of what it has bound have denied it later.
+    int denials = 0;
     /// The same, for exactly one reply: "id=7 no_task", "ok", or "" for none.
     std::string kind(std::string_view line) { return kinds(ask(line)); }
     reply_parts reply(std::string_view line) {
@@ -158,6 +160,7 @@ class test_link final : public recording_line_sink, public core::subscriber {
 
     [[nodiscard]] bool takes_updates() const override { return takes; }
     void put_updates(std::string_view lines) override { output().append(lines); }
+    void on_denied() override { ++denials; }
 
     bool takes = true;
 

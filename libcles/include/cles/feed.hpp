@@ -31,6 +31,7 @@ struct feed_item {
     T value{};               ///< of `current` and `update`
     std::string publisher{}; ///< the publishing node's name; empty if not known
     std::uint64_t seq = 0;   ///< of `update`: its sequence number in the noun's publications
+    std::uint32_t epoch = 0; ///< of what has a `seq`: that of the publisher's run, in which it counts
     std::uint64_t missed = 0;
     std::string text{};
 
@@ -112,6 +113,7 @@ bool fill(const raw_event& event, feed_item<T>& item, boost::system::error_code&
     item.kind = event.kind;
     item.publisher = event.publisher;
     item.seq = event.seq;
+    item.epoch = event.epoch;
     item.missed = event.missed;
     item.text = event.text;
     return !item.has_value() || detail::read_shared_body(event, item.value, code, why);

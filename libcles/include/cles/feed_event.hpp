@@ -13,7 +13,7 @@ namespace cles {
 
 /// The kinds of events of a feed.
 enum class feed_event : std::uint8_t {
-    current, ///< the publisher's last value when the binding was made; has no `seq`
+    current, ///< the publisher's last value when the binding was made; has a `seq` only with `bind_options::mark`
     update,  ///< an update
     gap,     ///< `missed` updates were not received
     lost,    ///< the publisher was lost, for the reason in `text`; the feed binds again by itself
@@ -29,6 +29,7 @@ struct raw_event {
     bool checked = false; ///< whether the body is known to be valid JSON
     std::string_view publisher{};
     std::uint64_t seq = 0;
+    std::uint32_t epoch = 0;
     std::uint64_t missed = 0;
     std::string_view text{};
     std::string_view line{};           ///< of an update that is not queued: the whole line

@@ -63,13 +63,14 @@ inline constexpr std::array<count_range, 17> count_ranges{{
     {"memory", &limits::memory, 64 * detail::kibi, detail::most_memory},
 }};
 
-inline constexpr std::array<time_range, 6> time_ranges{{
+inline constexpr std::array<time_range, 7> time_ranges{{
     {"stall", &limits::stall, detail::instant, detail::day},
     {"lease", &limits::lease, std::chrono::milliseconds{20}, std::chrono::minutes{1}},
     {"connect", &limits::connect, detail::instant, detail::day},
     {"discard", &limits::discard, detail::instant, detail::day},
     {"first_line", &limits::first_line, std::chrono::milliseconds{0}, detail::day},
     {"probe", &limits::probe, detail::instant, detail::day},
+    {"silence", &limits::silence, std::chrono::milliseconds{0}, detail::day},
 }};
 
 /// \throws cles::error with `invalid_option`, naming the first member that is out of range

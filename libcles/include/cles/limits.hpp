@@ -54,6 +54,10 @@ struct limits {
     /// When a peer that has ended its stream is first probed; again after three times that, and at least every 15 s; 1
     /// ms to a day.
     std::chrono::milliseconds probe{5'000};
+    /// While something is bound at a node or a reply of it is awaited, on a stream, that node may be silent for this
+    /// long. After a third of it, it is asked whether it is alive; only what is known to be a node is asked. A node
+    /// whose handler keeps its thread busy for longer cannot answer. Up to a day; 0: for ever.
+    std::chrono::milliseconds silence{10'000};
 };
 
 } // namespace cles

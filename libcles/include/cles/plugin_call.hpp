@@ -70,6 +70,12 @@ class plugin_call final : public call_control {
     }
 
     void delegate(std::string_view command, const call_options& options, answer_callback answered) override {
+        if (!options.at_node_.empty()) { // the interface has no place for it
+            throw error(errc::invalid_option, "a plugin cannot state which node may answer at a URL");
+        }
+        if (options.is_on_behalf_) { // it would be sent with the rights of the node
+            throw error(errc::invalid_option, "a plugin cannot send requests on behalf of a member");
+        }
         auto owned = std::make_unique<asked>(asked{host_, job_, std::move(answered), options.on_progress_});
         const cles_ask crossing{.size = sizeof(cles_ask),
                                 .urgent = options.urgent_ ? 1U : 0U,

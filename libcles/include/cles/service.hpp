@@ -472,7 +472,7 @@ class service : public registrar {
 
     /// The blocking form, for programs without coroutines: runs the context until the reply arrives. Only for an
     /// `io_context` that no other thread runs.
-    /// \throws cles::error as above; `would_deadlock` inside a handler
+    /// \throws cles::error as above; `would_deadlock` inside a handler, and if another thread runs the context
     std::string request(std::string_view command, const call_options& options = {});
 
   private:
@@ -578,7 +578,8 @@ class service : public registrar {
     friend struct detail::bind_coroutine;
 
     std::shared_ptr<detail::engine> engine_;
-    bool pooled_; ///< whether it has made a strand of a pool
+    bool pooled_;        ///< whether it has made a strand of a pool
+    bool alone_ = false; ///< whether the last blocking request found no other thread that runs the context
 };
 
 template <class T>

@@ -17,8 +17,9 @@ call_options& call_options::deadline(std::chrono::milliseconds limit) {
     return *this;
 }
 
-call_options& call_options::at(std::string_view url) {
+call_options& call_options::at(std::string_view url, std::string_view node) {
     at_ = url;
+    at_node_ = node;
     return *this;
 }
 
@@ -32,6 +33,12 @@ call_options& call_options::hops(std::uint32_t most) {
     return *this;
 }
 
+call_options& call_options::on_behalf_of(std::string_view member) {
+    is_on_behalf_ = true;
+    on_behalf_of_ = member;
+    return *this;
+}
+
 call_options& call_options::trace(std::string_view parent) {
     trace_ = parent;
     return *this;
@@ -42,8 +49,18 @@ call_options& call_options::diagnostics(std::string& text) {
     return *this;
 }
 
+call_options& call_options::failure(std::string& json) {
+    failure_ = &json;
+    return *this;
+}
+
 bind_options& bind_options::keep(std::uint32_t updates) {
     keep_ = updates;
+    return *this;
+}
+
+bind_options& bind_options::mark(bool wanted) {
+    mark_ = wanted;
     return *this;
 }
 
@@ -52,13 +69,18 @@ bind_options& bind_options::deadline(std::chrono::milliseconds limit) {
     return *this;
 }
 
-bind_options& bind_options::at(std::string_view url) {
-    call_options::at(url);
+bind_options& bind_options::at(std::string_view url, std::string_view node) {
+    call_options::at(url, node);
     return *this;
 }
 
 bind_options& bind_options::hops(std::uint32_t most) {
     call_options::hops(most);
+    return *this;
+}
+
+bind_options& bind_options::on_behalf_of(std::string_view member) {
+    call_options::on_behalf_of(member);
     return *this;
 }
 

@@ -226,11 +226,20 @@ std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std
     if (host->stopped()) {
         return refused(errc::stopped, "the service has been stopped");
     }
+    const bool is_own = !options.is_on_behalf_;
+    if (!is_own) {
+        if (auto objection = core::objection_to_member(host->node(), options, verb::bind, parts)) {
+            return refused(objection->code, std::move(objection->message));
+        }
+        if (options.multicast_) {
+            return refused(errc::invalid_option, "bind_options::on_behalf_of does not go together with multicast");
+        }
+    }
     std::string scratch;
     const std::string path{protocol::canonical_path(parts, scratch)};
     const std::string target{parts.target};
     const bool routes = host->node().active_router != nullptr; // then links bind `all`, through this service itself
-    if (options.multicast_ || (target == "all" && options.at_.empty() && !routes)) {
+    if (options.multicast_ || (target == "all" && options.at_.empty() && is_own && !routes)) {
         if (auto objection = objection_to(*host, parts, options); !objection.message.empty()) {
             return refused(objection.code, std::move(objection.message));
         }
@@ -242,12 +251,16 @@ std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std
     auto made = std::make_shared<link_feed>(host, target, path, options.every_.count() > 0);
     host->feeds().enter(made->machine(), made,
                         {.noun = std::string{noun},
-                         .at = options.at_,
+                         .at = is_own ? options.at_ : host->own_url(),
+                         .at_node = options.at_node_,
                          .deadline = options.deadline_,
                          .every_ms = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
                              options.every_.count(), 0, static_cast<std::int64_t>(protocol::max_deadline_ms))),
                          .keep = options.keep_,
-                         .hops = options.hops_});
+                         .hops = options.hops_,
+                         .adverbs = is_own ? std::string{} : "from=" + options.on_behalf_of_,
+                         .shows_mark = options.mark_,
+                         .requester = options.on_behalf_of_});
     return made;
 }
 

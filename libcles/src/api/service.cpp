@@ -9,10 +9,13 @@
 #include <boost/asio/strand.hpp>
 #include <boost/asio/thread_pool.hpp>
 
+#include <atomic>
+#include <chrono>
 #include <functional>
 #include <future>
 #include <initializer_list>
 #include <optional>
+#include <thread>
 #include <type_traits>
 #include <utility>
 
@@ -296,6 +299,40 @@ void service::start_bind(detail::starting<detail::binding_ptr> what, const std::
                    });
 }
 
+namespace {
+
+// Another thread that runs the context may take what this one waits for. So a blocking request waits a little for one
+// that is there, the first time, and never waits in the context for long.
+constexpr std::chrono::milliseconds time_to_take{5};
+constexpr std::chrono::milliseconds time_to_look{50};
+
+struct blocking_outcome {
+    // Whether another thread than that of the caller has begun the request, which is then not sent.
+    bool is_elsewhere() {
+        if (std::this_thread::get_id() != caller) {
+            elsewhere = true;
+            taken.set_value();
+        }
+        return elsewhere;
+    }
+
+    std::thread::id caller = std::this_thread::get_id();
+    std::promise<void> taken;
+    std::atomic<bool> elsewhere = false;
+    std::atomic<bool> ended = false;
+    std::thread::id answered_on;
+    boost::system::error_code code;
+    std::string body;
+    std::string why;
+};
+
+[[noreturn, gnu::cold]] void throw_not_alone() {
+    throw error(errc::would_deadlock, "another thread runs the service's context: start async_request there, with "
+                                      "boost::asio::co_spawn or boost::asio::post");
+}
+
+} // namespace
+
 std::string service::request(std::string_view command, const call_options& options) {
     const auto* own = engine_->executor().target<asio::io_context::executor_type>();
     if (own == nullptr) {
@@ -305,28 +342,35 @@ std::string service::request(std::string_view command, const call_options& optio
     if (own->running_in_this_thread()) {
         throw error(errc::would_deadlock, "inside a handler, co_await async_request instead");
     }
-    struct outcome {
-        bool ended = false;
-        boost::system::error_code code;
-        std::string body;
-        std::string why;
-    };
-    const auto result = std::make_shared<outcome>();
+    const auto result = std::make_shared<blocking_outcome>();
     auto asked = options;
     asked.diagnostics(result->why);
     asio::post(engine_->executor(), [this, result, asked, text = std::string{command}] {
+        if (result->is_elsewhere()) {
+            return;
+        }
         async_request(text, asked, [result](boost::system::error_code code, const json_text& reply) {
             result->code = code;
             result->body = reply.text;
+            result->answered_on = std::this_thread::get_id();
             result->ended = true;
         });
     });
+    // A thread that waits in `run` takes this at once.
+    if (!std::exchange(alone_, false) &&
+        result->taken.get_future().wait_for(time_to_take) == std::future_status::ready) {
+        throw_not_alone();
+    }
     io->restart();
     while (!result->ended) {
-        if (io->run_one() == 0) {
+        if (io->run_one_for(time_to_look) == 0 && io->stopped()) {
             throw error(errc::stopped, "the context was stopped before the answer was received");
         }
+        if (result->elsewhere) {
+            throw_not_alone();
+        }
     }
+    alone_ = result->answered_on == result->caller;
     if (options.diagnostics_ != nullptr && !result->why.empty()) {
         *options.diagnostics_ = result->why;
     }

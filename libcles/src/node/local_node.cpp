@@ -5,6 +5,7 @@
 #include <cles/json_reader.hpp>
 #include <cles/limit_ranges.hpp>
 
+#include "node/base/failure_copy.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/routing/other_pools.hpp"
 #include "node/session/request_checks.hpp"
@@ -117,6 +118,28 @@ std::string invalid_option_reason(const bind_options& options) {
                std::to_string(protocol::max_keep) + ", or 0 for the default";
     }
     return invalid_hops_reason("bind_options::hops", options.hops_);
+}
+
+std::optional<protocol::failure> objection_to_member(const node_state& n, const call_options& options, verb how,
+                                                     const protocol::noun_view& noun) {
+    const auto& member = options.on_behalf_of_;
+    const auto objection = [](errc code, std::string message) {
+        return protocol::failure{.code = code, .message = std::move(message)};
+    };
+    if (!protocol::is_name(member)) { // it becomes a part of a line
+        return objection(errc::invalid_option, "call_options::on_behalf_of is " + protocol::quoted(member) +
+                                                   ": must be the name of a member");
+    }
+    if (!options.at_.empty() || !options.at_node_.empty()) {
+        return objection(errc::invalid_option, "call_options::on_behalf_of does not go together with call_options::at");
+    }
+    if (!n.security) {
+        return objection(errc::denied, n.name + " has no security, so it can ask nothing on behalf of " + member);
+    }
+    if (noun.task == "cles" && how != verb::pull) {
+        return objection(errc::denied, n.name + " sends only PULL of the task 'cles' on behalf of " + member);
+    }
+    return std::nullopt;
 }
 
 std::chrono::milliseconds time_limit(std::chrono::milliseconds deadline, verb of) {
@@ -289,13 +312,21 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     if (!protocol::parse_noun(text, noun, why)) {
         return fail_later(std::move(operation), code, std::move(why));
     }
-    if (!protocol::is_reserved_target(noun.target) &&
-        !permits(*node_, {.requester = node_->name}, noun.target, how, noun)) {
+    const bool is_own = !options.is_on_behalf_;
+    if (!is_own) {
+        if (auto wrong = objection_to_member(*node_, options, how, noun)) {
+            return fail_later(std::move(operation), wrong->code, std::move(wrong->message));
+        }
+    } else if (!protocol::is_reserved_target(noun.target) &&
+               !permits(*node_, {.requester = node_->name}, noun.target, how, noun)) {
         return fail_later(std::move(operation), errc::denied,
                           node_->name + " may not send " + request_text(how, noun.path) + " to " +
                               std::string{noun.target});
     }
-    auto* r = peer_channels_.to({.target = noun.target, .at = options.at_, .urgent = options.urgent_}, code, why);
+    const auto own = is_own ? std::string{} : own_url();
+    const auto at = is_own ? std::string_view{options.at_} : std::string_view{own};
+    auto* r = peer_channels_.to(
+        {.target = noun.target, .at = at, .urgent = options.urgent_, .expected = options.at_node_}, code, why);
     if (r == nullptr) {
         return fail_later(std::move(operation), code, std::move(why));
     }
@@ -305,9 +336,18 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     const auto id = draw_id();
     const auto started = now();
     const auto deadline = saturating_add(started, time_limit(options.deadline_, how));
-    protocol::outgoing_request request{
-        .verb = how, .noun = text, .id = id, .carried = carried_by(options), .hops = options.hops_, .body = body};
-    if (node_->secured) {
+    const auto adverbs = is_own ? std::string{} : "from=" + options.on_behalf_of_;
+    protocol::outgoing_request request{.verb = how,
+                                       .noun = text,
+                                       .id = id,
+                                       .carried = carried_by(options),
+                                       .hops = options.hops_,
+                                       .adverbs = adverbs,
+                                       .body = body};
+    if (options.failure_ != nullptr) {
+        operation = detail::pending_ptr{new failure_copy{std::move(operation), *options.failure_}};
+    }
+    if (node_->secured && is_own) { // a node signs no requests of others
         operation = node_->secured->watch({.how = how,
                                            .noun = noun,
                                            .body = body,
@@ -318,10 +358,10 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
                                           std::move(operation));
     }
     if (request.carried.trace.sampled) {
-        operation = peer_channels_.record(request, options.at_, {}, std::move(operation));
+        operation = peer_channels_.record(request, at, {}, std::move(operation));
     }
     flush_scheduler_.run_user_call(
-        [&] { r->send(request, deadline, started, std::move(operation), options.on_progress_); });
+        [&] { r->send(request, deadline, started, std::move(operation), options.on_progress_, {}); });
     return id;
 }
 

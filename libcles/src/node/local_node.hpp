@@ -18,6 +18,8 @@
 #include "node/session/connections.hpp"
 #include "port/environment.hpp"
 #include "port/ip_network.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -47,6 +49,10 @@ struct local_node_options {
 /// Which option is invalid, and why; empty if none is.
 [[nodiscard]] std::string invalid_option_reason(const call_options& options);
 [[nodiscard]] std::string invalid_option_reason(const bind_options& options);
+
+/// Why a request cannot be sent on behalf of the member that the options name; nothing if it can. \pre they name one
+[[nodiscard]] std::optional<protocol::failure> objection_to_member(const node_state& n, const call_options& options,
+                                                                   verb how, const protocol::noun_view& noun);
 
 /// The time limit for a given deadline: the verb's default if it is 0, and at most a day.
 [[nodiscard]] std::chrono::milliseconds time_limit(std::chrono::milliseconds deadline, verb of);
@@ -82,6 +88,9 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     /// The address of a peer whose address may be forged, for which there is a limit on what is sent there; empty for
     /// others.
     [[nodiscard]] std::string unverified_address(const identity& peer) const;
+    /// The address of this node itself, at which it serves its program's requests for `any` and `all`, and those on
+    /// behalf of members. These are forwarded as those of other clients, so none leaves without the right to forward.
+    [[nodiscard]] std::string own_url() const { return "inproc://" + listeners_.self_endpoint(); }
     void write_log(log_level level, const log_entry& what) const { node_->write_log(level, what); }
     /// The same from inside a loop over data that the log function could change.
     void post_log(log_level level, std::string what, std::string peer = {}) const {

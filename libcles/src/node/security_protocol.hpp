@@ -6,6 +6,7 @@
 #include <cles/pending.hpp>
 #include <cles/verb.hpp>
 
+#include "node/base/peer_reply.hpp"
 #include "node/membership/announcement.hpp"
 #include "port/environment.hpp"
 #include "port/group_port.hpp"
@@ -59,6 +60,9 @@ class link_security {
     virtual bool serve(const protocol::request_line& request, time_point now) = 0;
     /// Whether a bound update is to be delivered now. Others are delivered later, or counted and dropped.
     [[nodiscard]] virtual bool admits(const protocol::request_line& update) = 0;
+    /// Asks a publisher whose updates the peer passes on for its epoch, and for what it signs. `then` is called once:
+    /// with the answer, or by `due` with the failure if the publisher has not signed one.
+    virtual void ask(const std::string& publisher, time_point due, peer_reply::function then) = 0;
     /// States the version of this node's roster.
     virtual void send_hello() = 0;
 };

@@ -41,7 +41,8 @@ BOOST_AUTO_TEST_CASE(pull_self_cles_returns_the_description_of_the_node) {
     node.pass(1500ms);
     BOOST_TEST(link.ask("PULL self:cles id=7") ==
                "id=7 {\"node\":\"car1\",\"version\":\"" + std::string{cles::version} +
-                   "\",\"protocol\":1,\"features\":[\"mark\"],\"epoch\":\"5f3a09c1\",\"uptime_ms\":1500,"
+                   "\",\"protocol\":1,\"features\":[\"mark\"],\"limits\":{\"line\":1048576},"
+                   "\"epoch\":\"5f3a09c1\",\"uptime_ms\":1500,"
                    "\"endpoints\":[\"tcp://127.0.0.1:25370\",\"unix:///run/car1.sock\"],"
                    "\"tasks\":[],\"load\":{\"queued\":0,\"running\":0,\"workers\":0}}\n");
     BOOST_TEST(link.kind("PULL car1:cles") == "ok");

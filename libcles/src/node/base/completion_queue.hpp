@@ -29,7 +29,8 @@ using pending_event_ptr = detail::operation_ptr<detail::pending_event>;
 /// An event of a feed that owns its texts.
 struct kept_event {
     explicit kept_event(const detail::raw_event& e)
-        : kind(e.kind), body(e.body), publisher(e.publisher), seq(e.seq), missed(e.missed), text(e.text) {}
+        : kind(e.kind), epoch(e.epoch), body(e.body), publisher(e.publisher), seq(e.seq), missed(e.missed),
+          text(e.text) {}
 
     [[nodiscard]] detail::raw_event view() const noexcept {
         return {.kind = kind,
@@ -37,11 +38,13 @@ struct kept_event {
                 .checked = true,
                 .publisher = publisher,
                 .seq = seq,
+                .epoch = epoch,
                 .missed = missed,
                 .text = text};
     }
 
     feed_event kind;
+    std::uint32_t epoch;
     std::string body;
     std::string publisher;
     std::uint64_t seq;

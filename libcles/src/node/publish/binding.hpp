@@ -25,6 +25,9 @@ class subscriber {
     /// Whether it takes more updates now; if not, it requests the rest when it does.
     [[nodiscard]] virtual bool takes_updates() const = 0;
     virtual void put_updates(std::string_view lines) = 0;
+    /// The publisher of a noun that it has bound through this node denies it from now on. Ends no binding inside the
+    /// call.
+    virtual void on_denied() {}
 
   protected:
     ~subscriber() = default;

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/publish/feed_links.hpp"
 
-#include <cles/json_reader.hpp>
-
 #include "node/base/deadlines.hpp"
 #include "node/local_node.hpp"
 #include "node/routing/peer_channels.hpp"
@@ -18,29 +16,12 @@
 namespace cles::core {
 namespace {
 
-/// Whether the reply to `PULL self:cles` lists the feature `mark`.
-bool lists_mark(std::string_view description) {
-    json_reader reader{description, detail::answer_depth};
-    bool found = false;
-    std::string_view key;
-    reader.begin_object();
-    while (reader.next_key(key)) {
-        if (key != "features" || reader.peek() != json_reader::kind::array) {
-            reader.skip();
-            continue;
-        }
-        reader.begin_array();
-        while (reader.next_element()) {
-            std::string_view feature;
-            if (reader.peek() != json_reader::kind::string) {
-                reader.skip();
-            } else if (reader.read(feature)) {
-                found = found || feature == "mark";
-            }
-        }
-    }
-    return found;
+// As long as its user waits for a BIND that is sent now.
+time_point whole_time(const feed_entry& e, time_point now) {
+    return saturating_add(now, time_limit(e.terms.deadline, verb::bind));
 }
+// What is left of the time of a BIND that had to learn something first, if it has not passed.
+time_point due_of(const feed_entry& e, time_point now) { return e.due && *e.due > now ? *e.due : whole_time(e, now); }
 
 } // namespace
 
@@ -85,17 +66,21 @@ detail::pending_ptr feed_links::on_reply(const feed_machine& feed, reply_functio
     return detail::pending_ptr{new feed_reply(host_.weak_from_this(), feed.entry().handle, std::move(then))};
 }
 
+// `self` is whoever is there, and `all` has many publishers.
+bool feed_links::is_passed_on(const feed_machine& feed, const connection& c) const {
+    return host_.node().secured && c.peer().transport != "inproc" && c.peer().name != feed.target() &&
+           !protocol::is_reserved_target(member_of(host_.node(), feed.target()));
+}
+
 // The value in a reply is not signed. So if updates must be, or that is not known, only the publisher's own reply
 // counts.
 bool feed_links::is_value_trusted(feed_machine& feed) const {
     const auto c = feed.entry().on.lock();
-    const auto& secured = host_.node().secured;
-    if (!secured || !c || feed.target() == "all" || feed.target() == "self" || c->peer().transport == "inproc" ||
-        c->peer().name == feed.target()) {
+    if (!c || !is_passed_on(feed, *c)) {
         return true;
     }
     const auto task = std::string_view{feed.path()}.substr(0, feed.path().find('/'));
-    return !secured->must_be_signed(feed.target(), task).value_or(true);
+    return !host_.node().secured->must_be_signed(feed.target(), task).value_or(true);
 }
 
 void feed_links::on_bind_reply(feed_machine& feed, const reply& received, std::optional<time_point> asked,
@@ -126,7 +111,8 @@ void feed_links::on_bind_reply(feed_machine& feed, const reply& received, std::o
     if (mark && marks == marking::up_to_it) {
         feed.skip_to(*mark);
     }
-    feed.on_bound(last, marks == marking::as_update ? mark : std::nullopt);
+    const bool shown = feed.entry().terms.shows_mark;
+    feed.on_bound(last, marks == marking::as_update ? mark : std::nullopt, mark && shown ? *mark : update_mark{});
     if (asked) {
         feed.on_leased(*asked);
     }
@@ -164,9 +150,11 @@ void feed_links::bind(feed_machine& feed) {
     auto& e = feed.entry();
     boost::system::error_code code;
     std::string why;
-    auto* r = host_.peer_channels().to(
-        {.target = feed.target(), .at = e.terms.at, .by = {.via = e.terms.via, .requester = e.terms.requester}}, code,
-        why);
+    auto* r = host_.peer_channels().to({.target = feed.target(),
+                                        .at = e.terms.at,
+                                        .expected = e.terms.at_node,
+                                        .by = {.via = e.terms.via, .requester = e.terms.requester}},
+                                       code, why);
     if (r == nullptr) {
         refuse_later(feed, code, why);
         return;
@@ -186,17 +174,33 @@ void feed_links::bind(feed_machine& feed) {
                });
 }
 
+// For an existing binding, the publisher may have queued updates that are older than the value in its reply. (A reply
+// for `all` comes from several publishers, and has the mark of each value in its body.)
+feed_links::marking feed_links::marking_of(feed_machine& feed, connection& c) {
+    const bool joins = !feed.was_bound() && feed.target() != "all" && c.session().bound().has_bound_for(feed);
+    const auto& terms = feed.entry().terms;
+    return terms.marked ? marking::as_update : joins || terms.shows_mark ? marking::up_to_it : marking::none;
+}
+
 void feed_links::send_bind(feed_machine& feed, const std::shared_ptr<connection>& c) {
-    auto& e = feed.entry();
-    // For an existing binding, the publisher may have queued updates that are older than the value in its reply. (A
-    // reply for `all` comes from several publishers, and has the mark of each value in its body.)
-    const bool joins = !feed.was_bound() && feed.target() != "all" && c->session().bound().has_bound_for(feed);
-    auto marks = e.terms.marked ? marking::as_update : joins ? marking::up_to_it : marking::none;
-    if (marks != marking::none && !c->marks()) {
-        ask_for_features(feed, c);
+    // A node is asked before the first BIND, also for what it reads; anything else only if that is needed.
+    if (c->description() == nullptr && (marking_of(feed, *c) != marking::none || (!c->is_datagram() && c->is_node()))) {
+        ask_for_description(feed, c);
         return;
     }
-    if (marks != marking::none && !*c->marks()) {
+    // What a node of another pool has published counts from its first update on (docs/federation.md, "Security").
+    if (is_passed_on(feed, *c) && c->peer().transport != "pool" && host_.node().peers.owner(feed.target()) == nullptr) {
+        ask_publisher(feed, c);
+        return;
+    }
+    bind_on(feed, c);
+}
+
+void feed_links::bind_on(feed_machine& feed, const std::shared_ptr<connection>& c) {
+    auto& e = feed.entry();
+    auto marks = marking_of(feed, *c);
+    const auto* const publisher = c->description();
+    if (marks != marking::none && (publisher == nullptr || !publisher->marks)) {
         marks = marking::none;
     }
     e.on = c;
@@ -204,38 +208,55 @@ void feed_links::send_bind(feed_machine& feed, const std::shared_ptr<connection>
     const auto asked = c->is_datagram() ? std::optional{now} : std::nullopt;
     auto request = bind_request(feed, *c);
     request.wants_mark = marks != marking::none;
-    const auto whole = saturating_add(now, time_limit(e.terms.deadline, verb::bind));
-    const auto due = std::exchange(e.due, {}).value_or(whole);
-    c->bind(feed, request, due > now ? due : whole,
-            on_reply(feed, [&feed, asked, marks](local_node* host, const reply& received) {
+    const auto due = due_of(e, now);
+    e.due.reset();
+    c->bind(feed, request, due, on_reply(feed, [&feed, asked, marks](local_node* host, const reply& received) {
                 if (host != nullptr) {
                     host->feeds().on_bind_reply(feed, received, asked, marks);
                 }
             }));
 }
 
-void feed_links::ask_for_features(feed_machine& feed, const std::shared_ptr<connection>& c) {
+void feed_links::ask_for_description(feed_machine& feed, const std::shared_ptr<connection>& c) {
+    feed.entry().due = whole_time(feed.entry(), host_.now());
+    c->await_description(
+        [weak = host_.weak_from_this(), handle = feed.entry().handle, &feed](const peer_answer& found) {
+            const auto host = weak.lock();
+            const auto alive = handle.lock();
+            if (!host || !alive || feed.closed()) {
+                return;
+            }
+            if (found.code == errc::unavailable || found.code == errc::busy) {
+                feed.on_refused(found.code, std::string{found.message}, host->now());
+            } else {
+                host->feeds().bind(feed);
+            }
+        });
+}
+
+// Without its announcement, only the publisher can tell in which epoch it runs, and what it signs: then its updates and
+// the value in the reply count from the beginning. If it does not tell, none of them would count, so that is an error.
+void feed_links::ask_publisher(feed_machine& feed, const std::shared_ptr<connection>& c) {
     auto& e = feed.entry();
-    const auto now = host_.now();
-    const auto whole = time_limit(e.terms.deadline, verb::bind);
-    const auto limit = std::min(time_limit({}, verb::pull), whole);
-    e.due = saturating_add(now, whole);
-    c->session().asking().send({.verb = verb::pull, .noun = "self:cles", .id = host_.draw_id()},
-                               saturating_add(now, limit), now,
-                               on_reply(feed, [&feed, on = std::weak_ptr{c}](local_node* host, const reply& received) {
-                                   if (received.code == errc::unavailable || received.code == errc::busy) {
-                                       if (host != nullptr) {
-                                           feed.on_refused(received.code, std::string{received.text}, host->now());
-                                       }
-                                       return;
-                                   }
-                                   if (const auto link = on.lock()) {
-                                       link->set_marks(!received.code && lists_mark(received.text));
-                                   }
-                                   if (host != nullptr && !feed.closed()) {
-                                       host->feeds().bind(feed);
-                                   }
-                               }));
+    e.due = due_of(e, host_.now());
+    c->session().ask_publisher(
+        feed.target(), *e.due,
+        [weak = host_.weak_from_this(), handle = e.handle, &feed, asked = std::weak_ptr{c}](const peer_answer& found) {
+            const auto host = weak.lock();
+            const auto alive = handle.lock();
+            if (!host || !alive || feed.closed()) {
+                return;
+            }
+            const auto there = asked.lock();
+            if (found.code) {
+                feed.entry().due.reset(); // the next attempt has a time of its own
+                feed.on_refused(found.code, std::string{found.message}, host->now(), std::string{found.refusal});
+            } else if (there && there->usable()) {
+                host->feeds().bind_on(feed, there);
+            } else {
+                host->feeds().bind(feed);
+            }
+        });
 }
 
 protocol::outgoing_request feed_links::bind_request(feed_machine& feed, const connection& c) {

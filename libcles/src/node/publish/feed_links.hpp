@@ -63,15 +63,21 @@ class feed_links final : public feed_host {
     enum class marking : std::uint8_t {
         none,
         as_update, ///< the value is delivered as an update if it is new
-        up_to_it,  ///< updates up to it are old: they were queued for a shared binding
+        up_to_it,  ///< updates up to it are old: they were queued for a shared binding, or are in the value
     };
 
     [[nodiscard]] detail::pending_ptr on_reply(const feed_machine& feed, reply_function then);
-    /// `asked`: when the BIND was sent by datagram; empty for a stream.
+    /// In a secured fleet: whether the node at the other end has not proved to be the publisher, and so may pass on
+    /// what that one has published.
+    [[nodiscard]] bool is_passed_on(const feed_machine& feed, const connection& c) const;
     [[nodiscard]] bool is_value_trusted(feed_machine& feed) const;
+    /// `asked`: when the BIND was sent by datagram; empty for a stream.
     void on_bind_reply(feed_machine& feed, const reply& received, std::optional<time_point> asked, marking marks);
     void send_bind(feed_machine& feed, const std::shared_ptr<connection>& c);
-    void ask_for_features(feed_machine& feed, const std::shared_ptr<connection>& c);
+    void ask_for_description(feed_machine& feed, const std::shared_ptr<connection>& c);
+    void ask_publisher(feed_machine& feed, const std::shared_ptr<connection>& c);
+    void bind_on(feed_machine& feed, const std::shared_ptr<connection>& c);
+    [[nodiscard]] static marking marking_of(feed_machine& feed, connection& c);
     [[nodiscard]] protocol::outgoing_request bind_request(feed_machine& feed, const connection& c);
     /// Whether the node may bind it. True without security.
     [[nodiscard]] bool is_permitted(feed_machine& feed) const;

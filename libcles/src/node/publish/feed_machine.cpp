@@ -23,7 +23,8 @@ void feed_machine::start(detail::pending_ptr bound, time_point due) {
     host_.bind(*this);
 }
 
-void feed_machine::on_bound(std::string_view last, const std::optional<update_mark>& mark) {
+void feed_machine::on_bound(std::string_view last, const std::optional<update_mark>& as_update,
+                            const update_mark& mark) {
     if (state_ != state::binding) {
         return;
     }
@@ -35,14 +36,14 @@ void feed_machine::on_bound(std::string_view last, const std::optional<update_ma
         mail_.put({.kind = feed_event::rebound});
     }
     was_bound_ = true;
-    if (mark) {
-        take_marked(body, *mark);
+    if (as_update) {
+        take_marked(body, *as_update);
         if (state_ != state::bound) { // its handler has closed the feed
             return;
         }
     }
     if (body != "{}") {
-        mail_.put({.kind = feed_event::current, .body = body, .checked = true});
+        mail_.put({.kind = feed_event::current, .body = body, .checked = true, .seq = mark.seq, .epoch = mark.epoch});
     }
     if (first_) {
         completions_.succeed(std::move(first_), body);
@@ -124,7 +125,11 @@ void feed_machine::on_refused(boost::system::error_code why, std::string_view me
         }
         return;
     }
+    const std::string text{message};
     pause(now);
+    if (why == errc::denied && entry_.on_denied) {
+        entry_.on_denied(text);
+    }
 }
 
 void feed_machine::on_lost(std::string_view why, time_point now) {

@@ -17,6 +17,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,12 +32,14 @@ class feed_machine;
 struct feed_terms {
     std::string noun;
     std::string at;
+    std::string at_node{}; ///< the only node that may answer at `at`; empty: any
     std::chrono::milliseconds deadline{};
     std::uint32_t every_ms = 0;
     std::uint32_t keep = 0;
     std::uint32_t hops = protocol::default_hops;
     std::string adverbs{};   ///< further ones, in wire format
     bool marked = false;     ///< requests the mark of the last value, if the publisher supports it
+    bool shows_mark = false; ///< the same, for the reader of the events: the value is not delivered as an update too
     std::string via{};       ///< nodes that have forwarded it
     std::string requester{}; ///< the member for which this node binds it, if it is another one
 };
@@ -48,7 +51,9 @@ struct feed_entry {
     std::weak_ptr<connection> on{};
     std::string at{};                ///< the URL used last
     std::uint64_t asking = 0;        ///< the id of its last BIND by datagram
-    std::optional<time_point> due{}; ///< the deadline of a BIND that waits for the node's features
+    std::optional<time_point> due{}; ///< the deadline of a BIND that waits for what it needs to know first
+    /// The publisher denies what it has permitted before; with its reason. Does not destroy the feed.
+    std::function<void(const std::string& why)> on_denied{};
 };
 
 /// What a feed needs of the service.
@@ -87,9 +92,10 @@ class feed_machine final
     /// Binds for the first time. The operation completes with the reply, or fails at `due`, whatever it waits for then;
     /// if it fails, the feed is closed.
     void start(detail::pending_ptr bound, time_point due = time_point::max());
-    /// `mark`: the update that holds the last value, if the publisher says so. If it is new, it is delivered as an
-    /// update too.
-    void on_bound(std::string_view last, const std::optional<update_mark>& mark = {});
+    /// `as_update`: the update that holds the last value, if the publisher says so. If it is new, it is delivered as an
+    /// update too. `mark`: the same, which is only told with the value.
+    void on_bound(std::string_view last, const std::optional<update_mark>& as_update = {},
+                  const update_mark& mark = {});
     /// Bound by datagram, with a lease of `limits::lease`. It counts from the time the BIND was sent, not from the
     /// reply, so that it never ends at the publisher before it does here. It is renewed after a third of it, or a
     /// little earlier at random, so that many renewals do not coincide.

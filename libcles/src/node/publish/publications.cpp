@@ -221,7 +221,7 @@ void publications::end(topic& t, std::size_t body_at) {
     const auto line = t.pending();
     if (line.size() > bounds_.line) {
         throw error(errc::too_large, "an update of '" + t.path() + "' has " + std::to_string(line.size()) +
-                                         " bytes, the limit is " + std::to_string(bounds_.line));
+                                         " bytes, the limit is " + std::to_string(bounds_.line) + " (limits.line)");
     }
     if (protocol::begins_with_error(line.substr(body_at))) {
         throw error(errc::failed, "an update whose first key is 'error' would be read as a failure");

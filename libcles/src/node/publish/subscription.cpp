@@ -63,6 +63,7 @@ bool subscription::take(const protocol::request_line& update, feed_mailbox::hand
     detail::raw_event event{.body = update.body.empty() ? std::string_view{"{}"} : update.body,
                             .publisher = update.noun.target,
                             .seq = *update.seq,
+                            .epoch = *update.epoch,
                             .line = update.text,
                             .reading = update.reading};
     bool taken = true;
@@ -70,7 +71,11 @@ bool subscription::take(const protocol::request_line& update, feed_mailbox::hand
         event.checked = event.has_json();
         taken = event.checked;
         if (taken) {
-            on_event({.kind = feed_event::gap, .publisher = update.noun.target, .seq = *update.seq, .missed = *missed},
+            on_event({.kind = feed_event::gap,
+                      .publisher = update.noun.target,
+                      .seq = *update.seq,
+                      .epoch = *update.epoch,
+                      .missed = *missed},
                      when);
         }
     }

@@ -178,6 +178,12 @@ void topic::drain(time_point now) {
     refresh();
 }
 
+void topic::tell_denied() const {
+    for (const auto& b : bindings_) {
+        b->target().on_denied();
+    }
+}
+
 bool topic::has_capacity() const noexcept {
     if (!unthinned_) {
         return true;

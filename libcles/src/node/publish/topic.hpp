@@ -127,6 +127,8 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     [[nodiscard]] bool is_bound() const noexcept { return !bindings_.empty(); }
     /// Sends all subscribers their pending updates, as far as they take them.
     void drain(time_point now);
+    /// The publisher denies the noun.
+    [[gnu::cold]] void tell_denied() const;
     /// Records the positions after a binding was drained on its own.
     void refresh() noexcept;
     /// Whether one more update fits into the queue of every subscriber.

@@ -343,7 +343,8 @@ void scatter_gather::on_deadline(time_point) {
 void scatter_gather::follow() {
     if (bytes_ > routing_->host().bounds.line) { // it cannot fit any more
         call_->fail({.code = errc::too_large,
-                     .message = "the answers of all have more than " + std::to_string(bytes_) + " bytes",
+                     .message = "the answers of all have more than " + std::to_string(routing_->host().bounds.line) +
+                                " bytes (limits.line)",
                      .ran = true});
         withdraw();
     } else if (std::none_of(parts_.begin(), parts_.end(), [](const part& p) { return p.is_open(); })) {

@@ -41,17 +41,17 @@ bool offers(const node_state& n, verb v, std::string_view task) {
     return n.tasks.find(v, task) != nullptr;
 }
 
-void load_balancer::gather(const protocol::request_line& r, const request_origin& by,
+bool load_balancer::gather(const protocol::request_line& r, const request_origin& by,
                            const std::vector<std::string>& asked) {
+    bool not_forwarded = false;
     const auto was_asked = [&](std::string_view name) {
         return std::find(asked.begin(), asked.end(), name) != asked.end();
     };
     const auto may_ask = [&](std::string_view name) {
         const auto found = may_pass_on(node_, by, name, r.verb, r.noun);
-        not_forwarded_ = not_forwarded_ || found == passage::not_forwarded;
+        not_forwarded = not_forwarded || found == passage::not_forwarded;
         return found == passage::permitted;
     };
-    not_forwarded_ = false;
     const bool here =
         offers(node_, r.verb, r.noun.task) && !was_asked(node_.name) && permits(node_, by, node_.name, r.verb, r.noun);
     if (here) {
@@ -62,7 +62,7 @@ void load_balancer::gather(const protocol::request_line& r, const request_origin
         all_.push_back(&here_);
     }
     if (r.hops == 0) {
-        return;
+        return false;
     }
     for (const auto& o : others_.offers(r.verb, r.noun.task)) {
         if (o.by->live && o.by->reachable() && (r.via.empty() || !is_in_via(r.via, o.by->name)) &&
@@ -70,11 +70,12 @@ void load_balancer::gather(const protocol::request_line& r, const request_origin
             all_.push_back(o.by);
         }
     }
+    return not_forwarded;
 }
 
 load_balancer::chosen load_balancer::choose(const protocol::request_line& r, const request_origin& by,
                                             const std::vector<std::string>& asked, time_point now) {
-    gather(r, by, asked);
+    const bool not_forwarded = gather(r, by, asked);
     at_once_.clear();
     std::copy_if(all_.begin(), all_.end(), std::back_inserter(at_once_),
                  [now](const candidate* c) { return c->avoid_until <= now; });
@@ -84,7 +85,7 @@ load_balancer::chosen load_balancer::choose(const protocol::request_line& r, con
     }
     auto* found = selector_.select(at_once_.empty() ? all_ : at_once_);
     if (found == nullptr) {
-        return {.not_forwarded = not_forwarded_};
+        return {.not_forwarded = not_forwarded};
     }
     if (found == &here_) {
         const auto* h = node_.tasks.find(r.verb, r.noun.task);

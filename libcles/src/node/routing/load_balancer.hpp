@@ -55,7 +55,8 @@ class load_balancer {
     void avoid_local(time_point until) noexcept { here_.avoid_until = until; }
 
   private:
-    void gather(const protocol::request_line& r, const request_origin& by, const std::vector<std::string>& asked);
+    /// Lists those that can serve it. Returns whether one is left out only because this node may not forward.
+    bool gather(const protocol::request_line& r, const request_origin& by, const std::vector<std::string>& asked);
 
     const node_state& node_;
     const service_registry& others_;
@@ -63,7 +64,6 @@ class load_balancer {
     candidate here_;
     std::vector<candidate*> all_;     // for the current request
     std::vector<candidate*> at_once_; // of these, the nodes not to be avoided
-    bool not_forwarded_ = false;      // one is left out for that
 };
 
 /// Whether this node offers the task.

@@ -90,6 +90,11 @@ class upstream_feed final : private detail::pending_event, public std::enable_sh
 };
 
 void upstream_feed::begin(const forwarding_permit& permit) {
+    machine_.entry().on_denied = [this](const std::string& why) {
+        if (to_ != nullptr) {
+            to_->on_denied(failure_of(errc::denied, machine_.target(), why));
+        }
+    };
     host_->feeds().enter(machine_, weak_from_this(),
                          {.noun = machine_.target() + ":" + machine_.path(),
                           .at = {},
@@ -161,12 +166,13 @@ class peer_next_hop : public next_hop {
 
     std::uint64_t forward(const forwarding_permit& permit, const protocol::outgoing_request& r, time_point deadline,
                           detail::pending_ptr reply, outbound::progress_function progress) override {
-        return send(r, {.via = permit.via(), .requester = permit.requester()}, deadline, std::move(reply),
-                    std::move(progress));
+        return send(
+            r, {.target = r.target(), .by = {.via = permit.via(), .requester = permit.requester()}, .forwarded = true},
+            deadline, std::move(reply), std::move(progress));
     }
     std::uint64_t send_own(const protocol::outgoing_request& r, time_point deadline,
                            detail::pending_ptr reply) override {
-        return send(r, {}, deadline, std::move(reply), {});
+        return send(r, {.target = r.target()}, deadline, std::move(reply), {});
     }
     void cancel(std::uint64_t ticket) override { host_.cancel(ticket); }
     std::shared_ptr<void> bind(const forwarding_permit& permit, std::string_view path, feed_events& to) override {
@@ -177,14 +183,13 @@ class peer_next_hop : public next_hop {
     }
 
   private:
-    std::uint64_t send(const protocol::outgoing_request& r, const forwarding& by, time_point deadline,
+    std::uint64_t send(const protocol::outgoing_request& r, const peer_channels::destination& to, time_point deadline,
                        detail::pending_ptr reply, outbound::progress_function progress) {
         if (host_.stopped()) {
             host_.fail_later(std::move(reply), errc::stopped, {});
             return 0;
         }
-        return host_.peer_channels().send({.target = r.target(), .by = by}, r, deadline, std::move(reply),
-                                          std::move(progress));
+        return host_.peer_channels().send(to, r, deadline, std::move(reply), std::move(progress));
     }
 
     local_node& host_;

@@ -30,6 +30,8 @@ class feed_events {
     virtual void on_bound(std::string_view last) = 0;
     /// The first BIND was refused. It is not repeated, and no event follows.
     virtual void on_refused(const protocol::failure& why) = 0;
+    /// It was bound, and the publisher denies it since then. It is tried again, so `on_bound` may follow.
+    virtual void on_denied(const protocol::failure&) {}
     /// A new, valid update: its line as received, with the body at the end.
     virtual void on_update(std::string_view line, std::string_view body) = 0;
 

@@ -41,8 +41,11 @@ std::shared_ptr<connection> peer_channel::usable_link(const feed_machine* feed) 
 }
 
 void peer_channel::send(const protocol::outgoing_request& r, time_point deadline, time_point now,
-                        detail::pending_ptr operation, outbound::progress_function progress, bool anywhere) {
+                        detail::pending_ptr operation, outbound::progress_function progress, const manner& how) {
     if (const auto c = usable_link()) {
+        if (how.forwarded) {
+            c->prepare_to_forward();
+        }
         c->session().asking().send(r, deadline, now, std::move(operation), std::move(progress));
         return;
     }
@@ -61,7 +64,7 @@ void peer_channel::send(const protocol::outgoing_request& r, time_point deadline
     w->memory = std::move(held);
     w->operation = std::move(operation);
     w->progress = std::move(progress);
-    w->anywhere = anywhere;
+    w->how = how;
     host_->deadlines().arm(*w, deadline);
     requests_.push_back(std::move(w));
     dial();
@@ -107,6 +110,11 @@ void peer_channel::drop(const connection& c) {
     std::erase_if(links_, [&](const auto& held) { return held.get() == &c; });
 }
 
+bool peer_channel::leads_to_known_node() const {
+    const auto* const known = node_.empty() ? nullptr : host_->node().peers.owner(node_);
+    return known != nullptr && std::ranges::find(known->endpoints, address_) != known->endpoints.end();
+}
+
 void peer_channel::release() {
     for (const auto& c : std::vector{links_}) {
         if (c->usable() && c->is_idle()) {
@@ -138,6 +146,7 @@ void peer_channel::on_dialled(boost::system::error_code code, link_ptr made) {
         fail(code, "cannot connect to " + address_ + ": " + code.message());
     } else {
         const auto c = host_->connections().adopt(std::move(made), connection::origin::dialled);
+        c->set_channel(weak_from_this());
         links_.push_back(c);
         serve_waiting(c);
     }
@@ -148,6 +157,9 @@ void peer_channel::serve_waiting(const std::shared_ptr<connection>& c) {
     for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
         auto& w = *requests.front();
         w.memory.resize(0); // the link accounts for it now
+        if (w.how.forwarded) {
+            c->prepare_to_forward();
+        }
         c->session().asking().send(w.request, w.due(), now, std::move(w.operation), std::move(w.progress));
     }
     for (auto feeds = std::exchange(feeds_, {}); !feeds.empty(); feeds.pop_front()) {
@@ -179,7 +191,7 @@ void peer_channel::reroute(
     const std::function<peer_channel*(std::string_view target, const forwarding& by)>& channel_to) {
     for (auto next = requests_.begin(); next != requests_.end();) {
         const auto here = next++;
-        auto* const channel = (*here)->anywhere ? channel_to((*here)->request.target(), {}) : nullptr;
+        auto* const channel = (*here)->how.anywhere ? channel_to((*here)->request.target(), {}) : nullptr;
         if (channel != nullptr && channel != this) {
             (*here)->owner = channel;
             channel->requests_.splice(channel->requests_.end(), requests_, here);
@@ -318,7 +330,7 @@ std::uint64_t peer_channels::send(destination where, protocol::outgoing_request 
     }
     r.id = host_.draw_id();
     channel->send(r, deadline, host_.now(), std::move(operation), std::move(progress),
-                  where.at.empty() && where.by.empty() && !where.urgent);
+                  {.anywhere = where.at.empty() && where.by.empty() && !where.urgent, .forwarded = where.forwarded});
     return r.id;
 }
 
@@ -343,16 +355,15 @@ std::string peer_channels::neighbour_towards(std::string_view target, const forw
 
 peer_channels::place peer_channels::place_of(std::string_view target, const forwarding& by) const {
     const auto& own_name = host_.node().name;
-    const auto& listeners = host_.listeners();
     const bool routed = host_.node().active_router != nullptr && protocol::is_reserved_target(target);
     if (target == "self" || target == own_name || routed) {
-        return {"inproc://" + listeners.self_endpoint(), own_name};
+        return {host_.own_url(), own_name};
     }
     if (const auto configured = directory_.find(target); configured != directory_.end()) {
         return {configured->second, std::string{target}};
     }
     // With security, the other end would take this node for itself.
-    if (const auto endpoint = listeners.shared_endpoint(target);
+    if (const auto endpoint = host_.listeners().shared_endpoint(target);
         !host_.node().security && host_.environment().is_open(endpoint)) {
         return {"inproc://" + endpoint, std::string{target}};
     }
@@ -392,10 +403,12 @@ std::optional<peer_channels::place> peer_channels::discovered_place_of(std::stri
     auto hop = routes != nullptr ? routes->reach().next_hop_to(target, by.via, by.requester) : std::string{target};
     const auto where = hop == target ? known : peers.address_of(hop);
     if (!where || where->empty()) {
-        const auto reason =
-            known->empty() || routes == nullptr
-                ? " cannot find '" + std::string{target} + "': it has announced no address that is reachable from here"
-                : " has no link to '" + std::string{target} + "', and knows no route to it";
+        const auto reason = known->empty() || routes == nullptr
+                                ? " cannot find '" + std::string{target} +
+                                      "': it has announced no address that is reachable from here; state its URL in "
+                                      "'peers', or in 'links' a node that "
+                                      "reaches it"
+                                : " has no link to '" + std::string{target} + "', and knows no route to it";
         throw error(errc::no_target, host_.node().name + reason);
     }
     return place{std::string{*where}, std::move(hop)};
@@ -449,7 +462,7 @@ void peer_channels::reroute(peer_channel& channel) {
 }
 
 peer_channel* peer_channels::find(const destination& to, boost::system::error_code& code, std::string& why) {
-    const auto& [target, at, urgent, expected, by] = to;
+    const auto& [target, at, urgent, expected, by, forwarded] = to;
     try {
         auto [address, node] = at.empty() ? place_of(target, by) : place{std::string{at}, std::string{target}};
         const bool waits = at.empty() && address.starts_with(undiscovered);

@@ -49,10 +49,14 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     /// Receives a link, or null with an error code and a message.
     using ready_function =
         std::function<void(const std::shared_ptr<connection>&, boost::system::error_code, std::string_view)>;
+    /// How a request is sent.
+    struct manner {
+        bool anywhere = false;  ///< to the node that its noun names, wherever that is reached
+        bool forwarded = false; ///< it is of a client
+    };
     /// Sends a request on an open link, or as soon as there is one; see `outbound::send`.
-    /// `anywhere`: the request is for the node that its noun names, wherever that is reached.
     void send(const protocol::outgoing_request& r, time_point deadline, time_point now, detail::pending_ptr operation,
-              outbound::progress_function progress, bool anywhere = false);
+              outbound::progress_function progress, const manner& how);
     /// Cancels a request that waits for its link. Returns false if there is none with that id.
     bool cancel(std::uint64_t id);
     /// Calls `ready` with a link on which the feed's noun is not bound yet; no longer after `forget`.
@@ -75,6 +79,8 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     /// The node that was looked up by its name and is reached here; empty: only the address was given.
     [[nodiscard]] const std::string& node() const noexcept { return node_; }
     void set_node(std::string_view node) { node_ = node; }
+    /// Whether a node that others announce, by this name, is at this address.
+    [[nodiscard]] bool leads_to_known_node() const;
     /// Whether a link is being opened.
     [[nodiscard]] bool is_opening() const noexcept { return static_cast<bool>(give_up_); }
     /// Whether it can be removed without loss.
@@ -95,7 +101,7 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
         detail::pending_ptr operation;
         memory_reservation memory;
         outbound::progress_function progress;
-        bool anywhere = false;
+        manner how;
     };
     struct waiting_feed {
         feed_machine* feed;
@@ -137,6 +143,7 @@ class peer_channels {
         bool urgent = false;         ///< such requests have links of their own
         std::string_view expected{}; ///< the only node that may answer at `at`; empty: any
         forwarding by{};
+        bool forwarded = false; ///< the request is of a client
     };
     /// The channel that leads there, or null with the reason in `code` and `why`. It may only hold requests for a node
     /// that is not discovered yet.

@@ -33,6 +33,10 @@ class relays::relay final : public feed_events {
     }
     void stop() { upstream_.reset(); }
     void join(const std::weak_ptr<const void>& whose, result_callback done) {
+        if (denied_) {
+            done(nullptr, {}, {}, *denied_);
+            return;
+        }
         if (bound_) {
             done(&topic_, last_value(), mark(), {});
             return;
@@ -54,6 +58,7 @@ class relays::relay final : public feed_events {
 
     void on_bound(std::string_view last) override {
         bound_ = true;
+        denied_.reset();
         last_ = last;
         fresh_ = last_ != topic_.last_body(); // a marked last value was already delivered as an update
         held_last_.resize(last_.size());
@@ -80,6 +85,10 @@ class relays::relay final : public feed_events {
             }
         }
     }
+    void on_denied(const protocol::failure& why) override {
+        denied_ = why;
+        topic_.tell_denied();
+    }
     void on_update(std::string_view line, std::string_view body) override {
         topic_.begin().append(line);
         if (!topic_.account_memory()) { // the newest is forwarded anyway: it would not be sent again
@@ -102,8 +111,9 @@ class relays::relay final : public feed_events {
 
     relays& owner_;
     topic topic_;
-    std::shared_ptr<void> upstream_; // its binding at the other node
-    bool bound_ = false;             // it was bound, and will be again if it is lost
+    std::shared_ptr<void> upstream_;          // its binding at the other node
+    bool bound_ = false;                      // it was bound, and will be again if it is lost
+    std::optional<protocol::failure> denied_; // since it was bound last
     bool telling_ = false;
     bool fresh_ = false;
     std::string last_;

@@ -18,8 +18,7 @@ namespace cles::core {
 /// What a node has said of its present incarnation, when it was asked.
 struct confirmed_epoch {
     std::uint32_t epoch = 0;
-    /// Whose updates it signs. Nothing: only its announcement counts.
-    std::optional<std::vector<std::string>> signed_tasks{};
+    std::vector<std::string> signed_tasks{}; ///< whose updates it signs
 };
 
 /// The epochs that other nodes have confirmed, and when they were asked. Beyond the limit, the node that was asked

@@ -61,6 +61,7 @@ void serve_announced(node_state& host, reply_writer& replies, const protocol::re
     auto said = own != nullptr ? own->announced : announcement{.node = host.name, .pool = host.peers.pool()};
     said.load = host.load_now();
     said.roster = host.security->roster_version();
+    said.signed_tasks = host.tasks.signed_tasks();
     const auto seq = own != nullptr ? own->seq : 1;
     const auto made = sign_announcement(said, path_of(challenge), seq, host.epoch, *host.security);
     replies.write(r, [&](json_writer& w) {

@@ -3,6 +3,7 @@
 
 #include "json/json_members.hpp"
 #include "node/base/peer_reply.hpp"
+#include "node/base/wrapped_operation.hpp"
 #include "node/local_node.hpp"
 #include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
@@ -33,6 +34,7 @@ struct repeatable_request {
     std::string path;
     std::string body;
     std::string at;
+    std::string at_node;
     protocol::carried_adverbs carried{};
     std::uint32_t hops = protocol::default_hops;
     outbound::progress_function progress;
@@ -99,7 +101,7 @@ void send_signed(local_node& host, request_signer& by, const repeatable_request&
     const auto adverbs = std::string{"sig="}.append(sig);
     host.flush_scheduler().run_user_call([&] {
         const auto id = host.peer_channels().send(
-            {.target = to, .at = r.at},
+            {.target = to, .at = r.at, .expected = r.at_node},
             {.verb = r.how, .noun = noun, .carried = r.carried, .hops = r.hops, .adverbs = adverbs, .body = r.body},
             r.deadline, std::move(reply), std::move(progress));
         if (id != 0) {
@@ -204,39 +206,28 @@ class gathered_reply {
 };
 
 /// One attempt of a request: completes its operation, unless it is the first one and the reply asks for a signature.
-class attempt_of_request final : public detail::pending {
+class attempt_of_request final : public wrapped_operation {
   public:
     attempt_of_request(repeatable_request r, detail::pending_ptr operation)
-        : request_(std::move(r)), operation_(std::move(operation)) {}
+        : wrapped_operation(std::move(operation)), request_(std::move(r)) {}
     /// The second one. Whatever its outcome is, there is no third.
     attempt_of_request(std::weak_ptr<request_signer> signer, std::uint64_t ticket, detail::pending_ptr operation)
-        : repeated_(std::in_place, std::move(signer), ticket), operation_(std::move(operation)) {}
+        : wrapped_operation(std::move(operation)), repeated_(std::in_place, std::move(signer), ticket) {}
 
     verdict offer(std::string_view json) override {
         std::unique_ptr<attempt_of_request> self{this};
         if (!repeated_ && request_.target == "all" && gather(json)) {
             return verdict::completed;
         }
-        auto* const operation = operation_.release();
-        const auto found = operation->offer(json);
-        if (found == verdict::malformed) {
-            operation_.reset(operation);
-            static_cast<void>(self.release());
-        }
-        return found;
-    }
-    void fail(boost::system::error_code code, std::string_view message) override {
-        const std::unique_ptr<attempt_of_request> self{this};
-        operation_.release()->fail(code, message);
+        static_cast<void>(self.release());
+        return wrapped_operation::offer(json);
     }
     void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override {
         const std::unique_ptr<attempt_of_request> self{this};
         if (repeated_ || code != errc::denied || !repeat(answer)) {
-            operation_.release()->refuse(code, message, answer);
+            take_operation().release()->refuse(code, message, answer);
         }
     }
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return operation_->calls_user(); }
 
   private:
     bool repeat(std::string_view answer) {
@@ -250,7 +241,7 @@ class attempt_of_request final : public detail::pending {
         if (!node) {
             return false;
         }
-        detail::pending_ptr second{new attempt_of_request(request_.signer, request_.ticket, std::move(operation_))};
+        detail::pending_ptr second{new attempt_of_request(request_.signer, request_.ticket, take_operation())};
         send_signed(*host, *signer, request_, *node, sig, std::move(second), std::move(request_.progress));
         return true;
     }
@@ -279,7 +270,7 @@ class attempt_of_request final : public detail::pending {
         if (signatures.empty()) {
             return false;
         }
-        whole->take(std::move(operation_), signatures.size());
+        whole->take(take_operation(), signatures.size());
         for (const auto& [node, sig] : signatures) {
             auto then = [whole, node = node](const peer_answer& found) { whole->on_outcome(node, found); };
             send_signed(*host, *signer, request_, node, sig, detail::pending_ptr{new peer_reply{std::move(then), true}},
@@ -290,7 +281,6 @@ class attempt_of_request final : public detail::pending {
 
     repeatable_request request_{};
     std::optional<noted_ticket> repeated_; // of the second attempt only
-    detail::pending_ptr operation_;
 };
 
 } // namespace
@@ -306,6 +296,7 @@ detail::pending_ptr request_signer::watch(const outgoing_call& r, detail::pendin
                                                                          .path = std::string{r.noun.path},
                                                                          .body = std::string{protocol::trim(r.body)},
                                                                          .at = r.options.at_,
+                                                                         .at_node = r.options.at_node_,
                                                                          .carried = r.carried,
                                                                          .hops = r.options.hops_,
                                                                          .progress = r.options.on_progress_,

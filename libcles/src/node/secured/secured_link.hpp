@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "node/base/peer_reply.hpp"
 #include "node/node_state.hpp"
 #include "node/secured/confirmed_epochs.hpp"
 #include "node/secured/unconfirmed_updates.hpp"
@@ -9,7 +10,7 @@
 #include "node/session/outbound.hpp"
 
 #include <memory>
-#include <string_view>
+#include <string>
 
 namespace cles::core {
 
@@ -21,9 +22,13 @@ class secured_link final : public link_security {
 
     bool serve(const protocol::request_line& request, time_point now) override;
     bool admits(const protocol::request_line& update) override;
+    void ask(const std::string& publisher, time_point due, peer_reply::function then) override;
     void send_hello() override;
 
   private:
+    /// Counts and logs an update that is dropped.
+    void refuse(const std::string& why);
+
     std::shared_ptr<node_state> node_;
     confirmed_epochs& confirmed_;
     line_sink& out_;

@@ -69,8 +69,15 @@ bool secured_protocol::serve_reserved(reply_writer& replies, const protocol::req
 }
 
 std::optional<bool> secured_protocol::must_be_signed(std::string_view publisher, std::string_view task) const {
-    if (publisher == node_.name) {
-        return node_.tasks.is_signed(task);
+    return must_be_signed(publisher, task, std::nullopt);
+}
+
+std::optional<bool> secured_protocol::must_be_signed(std::string_view publisher, std::string_view task,
+                                                     std::optional<std::uint32_t> epoch) const {
+    // A command with the key of a node has its name, but not its tasks.
+    const auto own = publisher == node_.name ? std::optional{node_.tasks.is_signed(task)} : std::nullopt;
+    if (own.value_or(false)) {
+        return true;
     }
     const auto contains = [task](const std::vector<std::string>& tasks) {
         return std::ranges::find(tasks, task) != tasks.end();
@@ -79,11 +86,12 @@ std::optional<bool> secured_protocol::must_be_signed(std::string_view publisher,
         return contains(run->announced.signed_tasks);
     }
     const auto* const said = confirmed_.find(publisher);
-    return said != nullptr && said->signed_tasks ? std::optional{contains(*said->signed_tasks)} : std::nullopt;
+    return said != nullptr && said->epoch == epoch.value_or(said->epoch) ? std::optional{contains(said->signed_tasks)}
+                                                                         : own;
 }
 
 update_check secured_protocol::check(const protocol::request_line& update, bool direct) const {
-    const auto must = must_be_signed(update.noun.target, update.noun.task);
+    const auto must = must_be_signed(update.noun.target, update.noun.task, update.epoch);
     if (!must && !direct) {
         return update_check::refused;
     }

@@ -8,8 +8,10 @@
 #include "node/secured/signed_announcer.hpp"
 #include "node/security_protocol.hpp"
 
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <string_view>
 
 namespace cles::core {
 
@@ -43,6 +45,10 @@ class secured_protocol final : public security_protocol {
     [[nodiscard]] const request_challenges& challenges() const noexcept { return challenges_; }
 
   private:
+    /// \param epoch of the update; nothing: any, since it is not known
+    [[nodiscard]] std::optional<bool> must_be_signed(std::string_view publisher, std::string_view task,
+                                                     std::optional<std::uint32_t> epoch) const;
+
     node_state& node_;
     confirmed_epochs confirmed_;
     request_challenges challenges_;

@@ -3,7 +3,10 @@
 
 #include "node/local_node.hpp"
 #include "node/publish/feed_machine.hpp"
+#include "node/routing/peer_channels.hpp"
 #include "node/session/request_checks.hpp"
+
+#include <utility>
 
 namespace cles::core {
 namespace {
@@ -22,6 +25,10 @@ connection::connection(std::shared_ptr<local_node> host, link_ptr carrier, origi
       memory_(std::make_shared<memory_account>(host_->node().memory)),
       session_(host_->shared_node(), *this, *this, link_->peer()) {
     const bool accepted = from_ == origin::accepted;
+    if (from_ == origin::dialled) { // bindings by datagram have leases
+        const auto silence = link_->datagram() == 0 ? host_->bounds().silence : std::chrono::milliseconds{0};
+        node_there_ = std::make_unique<link_peer>(static_cast<link_peer::owner&>(*this), host_->deadlines(), silence);
+    }
     if (accepted || link_->datagram() == 0) {
         monitor_.emplace(static_cast<link_monitor::owner&>(*this), host_->deadlines(), host_->bounds(), host_->now());
     }
@@ -55,6 +62,9 @@ bool connection::accept_input(std::string_view text) {
     }
     if (monitor_ && (datagrams_ || !text.empty())) {
         monitor_->on_line(now());
+    }
+    if (node_there_) {
+        node_there_->on_line(now());
     }
     return true;
 }
@@ -129,7 +139,9 @@ void connection::on_writable() {
 
 void connection::on_restart() {
     const auto keep = shared_from_this();
-    marks_.reset();
+    if (node_there_) {
+        node_there_->forget();
+    }
     lose_bound({}, "the publisher has restarted");
     session_.asking().on_restart(host_->now());
 }
@@ -165,6 +177,9 @@ void connection::on_unanswered(bool lost) {
 // -- from the session ----------------------------------------------------------------------------------------------
 
 void connection::wake() {
+    if (node_there_ && !node_there_->is_watched()) {
+        node_there_->watch(host_->now());
+    }
     if (!now_) { // during a batch, `on_batch` flushes
         host_->flush_scheduler().flush_soon(*this);
     }
@@ -182,6 +197,9 @@ void connection::finish() {
     finished_ = true;
     if (monitor_) {
         monitor_->stop();
+    }
+    if (node_there_) {
+        node_there_->stop();
     }
     link_->finish();
 }
@@ -208,6 +226,18 @@ void connection::put_updates(std::string_view lines) {
         link_->output().append(lines);
     }
     host_->flush_scheduler().flush_soon(*this);
+}
+
+// A bridge has bound it for one requester of other pools, and has to drop that one. For others, this node goes on
+// trying.
+void connection::on_denied() {
+    if (peer().transport == "pool") {
+        host_->post_while_running([weak = weak_from_this()](local_node&) {
+            if (const auto self = weak.lock()) {
+                self->close();
+            }
+        });
+    }
 }
 
 // -- output --------------------------------------------------------------------------------------------------------
@@ -262,7 +292,7 @@ void connection::serve_more() {
 // Stops reading from a peer that does not read its replies, and watches for one that takes nothing for too long.
 void connection::update_backpressure() {
     const auto unsent = link_->unsent();
-    held_output_.resize(unsent);
+    held_output_.resize(unsent + session_.asking().held_bytes());
     const auto& bounds = host_->bounds();
     const bool too_much = unsent > (pause_for_backlog_ ? bounds.unread / 2 : bounds.unread);
     if (too_much != pause_for_backlog_) {
@@ -326,6 +356,98 @@ void connection::on_probe() {
         send_output();
         update_backpressure();
     }
+}
+
+// -- the node at the other end -------------------------------------------------------------------------------------
+
+// Another service of this process hangs with this one. What a member may not ask, it does not ask by itself.
+bool connection::is_node() const {
+    const auto& who = link_->peer();
+    if (who.transport == "inproc") {
+        return false;
+    }
+    if (!who.name.empty()) {
+        return permits(host_->node(), {.requester = host_->node().name}, who.name, verb::pull, "cles");
+    }
+    const auto channel = channel_.lock();
+    return channel && channel->leads_to_known_node();
+}
+
+bool connection::awaits_peer() const {
+    return !feeds_.empty() || !waiting_.empty() || session_.asking().in_flight() > questions_;
+}
+
+link_traffic connection::traffic() const {
+    return {.received = link_->received(),
+            .sent = link_->sent(),
+            .unsent = link_->unsent(),
+            .reads = !pause_for_queue_ && !pause_for_backlog_};
+}
+
+void connection::ask_peer() {
+    const auto now = host_->now();
+    ++questions_;
+    session_.asking().send({.verb = verb::pull, .noun = "self:cles", .id = host_->draw_id()},
+                           saturating_add(now, time_limit({}, verb::pull)), now,
+                           detail::pending_ptr{new peer_reply{[weak = weak_from_this()](const peer_answer& found) {
+                                                                  if (const auto self = weak.lock()) {
+                                                                      self->on_answer(found);
+                                                                  }
+                                                              },
+                                                              true}});
+}
+
+void connection::learn() {
+    node_there_->learn();
+    if (node_there_->is_learning() && !is_datagram()) {
+        session_.asking().hold();
+    }
+}
+
+void connection::prepare_to_forward() {
+    if (node_there_ && !is_datagram() && description() == nullptr && !node_there_->is_learning() && is_node()) {
+        learn();
+    }
+}
+
+void connection::await_description(std::function<void(const peer_answer&)> then) {
+    waiting_.push_back(std::move(then));
+    learn();
+}
+
+// Answers to the program's own requests count too.
+void connection::on_described(std::string_view json) {
+    if (!node_there_) {
+        return;
+    }
+    const auto keep = shared_from_this();
+    node_there_->on_described(peer_description::read(json));
+    const auto& found = node_there_->description();
+    session_.asking().release(found.node, found.line);
+    tell_waiting({.json = json});
+}
+
+// An answer that is no failure has been passed to `on_described`.
+void connection::on_answer(const peer_answer& found) {
+    --questions_;
+    if (found.code && node_there_->is_learning()) {
+        node_there_->on_undescribed();
+        session_.asking().release();
+        tell_waiting(found);
+    }
+}
+
+void connection::tell_waiting(const peer_answer& found) {
+    const auto waiting = std::exchange(waiting_, {});
+    for (const auto& then : waiting) {
+        then(found);
+    }
+}
+
+void connection::on_hung() {
+    const auto keep = shared_from_this();
+    const auto silence = std::to_string(host_->bounds().silence.count());
+    abandon("the node there has been silent for " + silence + " ms, and did not answer whether it is alive");
 }
 
 // -- feeds ---------------------------------------------------------------------------------------------------------
@@ -392,10 +514,16 @@ void connection::end(std::string_view why) {
     if (monitor_) {
         monitor_->stop();
     }
+    if (node_there_) {
+        node_there_->stop();
+    }
     held_output_.resize(0);
     host_->connections().forget(*this, link_->received(), link_->sent());
     lose_feeds(why);
     session_.on_lost(why);
+    if (node_there_) {
+        node_there_->stop(); // those that were told may have sent something
+    }
     now_.reset();
     host_->check_shutdown();
 }

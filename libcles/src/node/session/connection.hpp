@@ -3,11 +3,14 @@
 
 #include <cles/line_link.hpp>
 
+#include "node/base/peer_reply.hpp"
 #include "node/flush_scheduler.hpp"
 #include "node/session/link_monitor.hpp"
+#include "node/session/link_peer.hpp"
 #include "node/session/session.hpp"
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +20,7 @@ namespace cles::core {
 
 class feed_machine;
 class local_node;
+class peer_channel;
 
 /// A link and its session.
 class connection final : public link_events,
@@ -24,6 +28,7 @@ class connection final : public link_events,
                          public subscriber,
                          public flushable,
                          private link_monitor::owner,
+                         private link_peer::owner,
                          public std::enable_shared_from_this<connection> {
   public:
     /// `refused`: a source of datagrams beyond the limit, adopted only to be answered with `busy`.
@@ -52,9 +57,19 @@ class connection final : public link_events,
     [[gnu::cold]] void bind(feed_machine& feed, protocol::outgoing_request request, time_point deadline,
                             detail::pending_ptr operation);
     [[gnu::cold]] void unbind(feed_machine& feed);
-    /// Whether the peer's reply to BIND names the update that it holds; empty until the peer has been asked.
-    [[nodiscard]] std::optional<bool> marks() const noexcept { return marks_; }
-    void set_marks(bool does) noexcept { marks_ = does; }
+    /// The channel that has opened it, which knows what node it leads to.
+    void set_channel(std::weak_ptr<const peer_channel> by) noexcept { channel_ = std::move(by); }
+    /// Whether the peer is known to be a node of another process: others announce it, or it has authenticated itself.
+    [[nodiscard]] bool is_node() const override;
+    /// What the peer states about itself; null until it has been asked. Empty if it does not answer.
+    [[nodiscard]] const peer_description* description() const noexcept {
+        return node_there_ && node_there_->has_answered() ? &node_there_->description() : nullptr;
+    }
+    /// Asks the peer what it is, unless that has been done. `then` is called with the answer, or with the failure.
+    /// \pre this node has opened it, and `description` is null
+    void await_description(std::function<void(const peer_answer&)> then);
+    /// A request of a client is about to be sent: a node is asked first what it reads.
+    void prepare_to_forward();
 
     // link_events
     void on_line(std::string_view line) override;
@@ -90,10 +105,12 @@ class connection final : public link_events,
     [[gnu::cold]] void close() override;
     void retire() override { usable_ = false; }
     void check_peer(time_point since) override { link_->check_peer(since); }
+    [[gnu::cold]] void on_described(std::string_view json) override;
 
     // subscriber
     [[nodiscard]] bool takes_updates() const override;
     void put_updates(std::string_view lines) override;
+    [[gnu::cold]] void on_denied() override;
 
   private:
     /// Watches whether bytes move.
@@ -114,6 +131,16 @@ class connection final : public link_events,
     [[gnu::cold]] void on_silence() override;
     [[gnu::cold]] void on_probe() override;
     [[gnu::cold]] void evict() override;
+
+    // link_peer::owner
+    [[nodiscard]] bool awaits_peer() const override;
+    [[nodiscard]] link_traffic traffic() const override;
+    [[gnu::cold]] void ask_peer() override;
+    [[gnu::cold]] void on_hung() override;
+
+    void learn();
+    void on_answer(const peer_answer& found);
+    void tell_waiting(const peer_answer& found);
 
     [[gnu::cold]] void on_stall(time_point now);
     void schedule_buffer_release();
@@ -138,9 +165,12 @@ class connection final : public link_events,
     watch stall_{*this, &connection::on_stall}; // of bytes sent
     watch idle_{*this, &connection::on_idle};   // of bytes sent and received
     std::optional<datagram_output> datagrams_;
-    std::optional<link_monitor> monitor_; // of a stream, or a source of datagrams
+    std::optional<link_monitor> monitor_;   // of a stream, or a source of datagrams
+    std::unique_ptr<link_peer> node_there_; // of a link that this node has opened, else null
+    std::weak_ptr<const peer_channel> channel_;
+    std::vector<std::function<void(const peer_answer&)>> waiting_; // for the description
+    std::size_t questions_ = 0;                                    // to the peer, about itself, in flight
     std::vector<feed_machine*> feeds_;
-    std::optional<bool> marks_;
     std::optional<time_point> now_; // cached while a batch is processed
     unsigned lines_ = 0;            // in this batch
     bool usable_ = true;

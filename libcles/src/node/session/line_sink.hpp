@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <memory>
 #include <string>
+#include <string_view>
 
 namespace cles::core {
 
@@ -42,6 +43,8 @@ class line_sink {
     virtual void retire() {}
     /// A request is sent again: see `link::check_peer`.
     virtual void check_peer(time_point /*since*/) {}
+    /// The peer has answered a `PULL self:cles` with this valid JSON.
+    virtual void on_described(std::string_view /*json*/) {}
 
   protected:
     ~line_sink() = default;

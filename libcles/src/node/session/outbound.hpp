@@ -13,6 +13,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -55,7 +56,13 @@ class outbound {
     [[gnu::cold]] bool cancel(std::uint64_t id);
     /// Discards a request and its operation, without notifying anyone.
     [[gnu::cold]] void drop(std::uint64_t id);
-    /// Returns false if nobody waits for it, or it is malformed: it is dropped.
+    /// Until `release`, a request that not every node would read waits, and so do those that follow it: the peer has
+    /// been asked what it reads.
+    void hold() noexcept { holds_ = true; }
+    /// Sends what waits. From now on, requests that the peer would not read are refused.
+    /// \param peer its name, if it is known \param line the longest line that it reads, if it has said so
+    [[gnu::cold]] void release(std::string_view peer = {}, std::optional<std::size_t> line = std::nullopt);
+    /// Returns false if nobody waits for it, the request was not sent yet, or it is malformed: it is dropped.
     bool on_reply(const protocol::reply_line& reply);
     /// A reply over the line limit.
     [[gnu::cold]] void on_overlong(const protocol::reply_line& reply);
@@ -66,9 +73,12 @@ class outbound {
     /// Fails all pending requests.
     [[gnu::cold]] void lose(errc why, std::string_view message);
     /// Fails all pending requests because the node stops. No operation completes inside the call, not even the
-    /// library's own.
+    /// library's own. The peer learns it from the end of the link; over datagrams it is told.
     [[gnu::cold]] void stop();
     [[nodiscard]] std::size_t in_flight() const noexcept { return waiting_.size(); }
+
+    /// Of the lines that wait for `release`.
+    [[nodiscard]] std::size_t held_bytes() const noexcept { return held_bytes_; }
 
   private:
     struct entry final : deadline {
@@ -78,29 +88,51 @@ class outbound {
         outbound& owner;
         std::uint64_t id = 0;
         cles::verb verb{};
+        bool end_is_told = false; // to the peer, if it has not replied
         detail::pending_ptr operation;
         progress_function progress;
         double reported = 0;
         std::optional<retransmission> copies; // over datagrams
         std::optional<errc> refused;          // why it was not sent
+        std::string held{};                   // its line, which waits for `release`; empty: it does not
+        bool describes = false;               // the reply says what the peer is
     };
 
     /// The maximum size of a request, with its LF.
     [[nodiscard]] std::size_t longest() const noexcept;
+    /// Why one of another size is refused.
+    [[nodiscard, gnu::cold]] std::string too_large_reason() const;
+    /// Whether a request of this size waits.
+    [[nodiscard]] bool must_wait(std::size_t size) const noexcept;
     [[nodiscard]] bool has_memory_for(const protocol::outgoing_request& request);
     [[gnu::cold]] void on_due(entry& e, time_point now);
     [[gnu::cold]] void cancel_at_peer(std::uint64_t id);
+    [[nodiscard]] std::string cancel_noun(std::uint64_t id) const;
     [[gnu::cold]] void resend(entry& e, time_point now);
     void rearm(std::unique_ptr<entry> e, time_point due);
+    using entries = boost::unordered_flat_map<std::uint64_t, std::unique_ptr<entry>>;
+    std::unique_ptr<entry> take(entries::iterator which);
     std::unique_ptr<entry> take(std::uint64_t id);
+    /// The same for a reply with this id of the link: null too if the request was not sent.
+    std::unique_ptr<entry> take_answered(std::uint64_t link_id);
+    entries take_all();
     void recycle(std::unique_ptr<entry> e);
+    [[gnu::cold]] bool on_failure(const protocol::reply_line& reply);
     [[gnu::cold]] void fail(std::uint64_t id, errc why, std::string_view message);
 
     node_state& node_;
     line_sink& out_;
     std::uint64_t first_id_;
-    boost::unordered_flat_map<std::uint64_t, std::unique_ptr<entry>> waiting_;
+    entries waiting_;
     std::vector<std::unique_ptr<entry>> spare_;
+    bool holds_ = false;
+    std::vector<std::uint64_t> held_; // in order
+    std::size_t held_bytes_ = 0;
+    std::string peer_; // its name
+    std::size_t peer_line_ = std::numeric_limits<std::size_t>::max();
+    /// The last reply says that the peer has not read a request because it was too long. Then the peer ends the link,
+    /// and the replies that follow, all of them `cancelled`, are to requests that nobody has cancelled.
+    bool ends_after_long_line_ = false;
 };
 
 } // namespace cles::core

@@ -64,7 +64,7 @@ void reply_writer::send(reply_target where, std::string& text, std::size_t body)
         fail(where,
              {.code = errc::too_large,
               .message = node_.name + ": the answer has " + std::to_string(text.size()) + " bytes, the limit is " +
-                         std::to_string(max_reply_) + (out_.is_datagram() ? " by datagram: use TCP" : ""),
+                         std::to_string(max_reply_) + (out_.is_datagram() ? " by datagram: use TCP" : " (limits.line)"),
               .ran = true});
     } else if (where.wanted && text.size() > always_fits && !where.reserved && !out_.reserve(text.size() + 1)) {
         fail(where, {.code = errc::busy,

@@ -71,6 +71,7 @@ class reply_writer {
     void remember(dedup& seen) noexcept { seen_ = &seen; }
     /// The maximum length of a line, without its LF.
     [[nodiscard]] std::size_t longest() const noexcept { return max_reply_; }
+    [[nodiscard]] bool by_datagram() const noexcept { return out_.is_datagram(); }
 
     /// Sends a reply whose body `write` writes. If that throws, the exception passes through and nothing is sent.
     template <class F>

@@ -304,7 +304,7 @@ protocol::failure overlong(const node_state& n, std::size_t datagram) {
                 .message = n.name + ": a datagram has at most " + std::to_string(datagram) + " bytes: use TCP"};
     }
     return {.code = errc::too_large,
-            .message = n.name + ": a line has at most " + std::to_string(n.bounds.line) + " bytes"};
+            .message = n.name + ": a line has at most " + std::to_string(n.bounds.line) + " bytes (limits.line)"};
 }
 
 std::optional<protocol::failure> no_capacity_to_run(const node_state& n) {

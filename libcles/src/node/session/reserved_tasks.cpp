@@ -16,6 +16,7 @@
 
 #include <array>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -24,11 +25,13 @@
 namespace cles::core {
 namespace {
 
-void write_task(json_writer& w, std::string_view verb, std::string_view task, const task_info& info) {
+constexpr std::size_t longest_reply_head = 23; // "id=9223372036854775807 "
+
+void write_task(json_writer& w, std::string_view verb, std::string_view task, const task_info& info, told_tasks told) {
     w.begin_object();
     write_member(w, "verb", verb);
     write_member(w, "task", task);
-    if (!info.description.empty()) {
+    if (!info.description.empty() && told == told_tasks::described) {
         write_member(w, "description", std::string_view{info.description});
     }
     if (!info.parameters.empty()) {
@@ -75,6 +78,20 @@ std::string own_metrics(const node_state& n) {
     return is_valid_json(text, n.bounds.depth) ? text.substr(1, text.size() - 2) : std::string{};
 }
 
+// As much of the description as a datagram holds: others ask for it to learn that the node is there.
+std::string description_within(const node_state& n, std::size_t longest) {
+    std::string text;
+    for (const auto told : {told_tasks::described, told_tasks::named, told_tasks::none}) {
+        text.clear();
+        json_writer w{text};
+        write_description(w, n, told);
+        if (text.size() + longest_reply_head <= longest) {
+            break;
+        }
+    }
+    return text;
+}
+
 void serve_peers(node_state& host, reply_writer& replies, const protocol::request_line& r, const identity& peer) {
     const auto now = host.time.now();
     const auto zone = observed_source::of(peer).zone();
@@ -94,26 +111,26 @@ bool is_spans_request(const protocol::request_line& r) noexcept {
     return r.verb == verb::pull && parameters.size() == 2 && parameters[0] == "trace";
 }
 
-void write_tasks(json_writer& w, const node_state& n) {
+void write_tasks(json_writer& w, const node_state& n, told_tasks told) {
     w.begin_array();
     for (const auto& [task, handlers] : n.tasks.tasks()) {
         for (std::size_t i = 0; i < verb_count; ++i) {
             const bool opened = static_cast<verb>(i) == verb::bind && !handlers[i].present &&
                                 (n.tasks.can_bind(task) || n.published.knows(task));
             if (handlers[i].present || opened) {
-                write_task(w, verb_names[i], task, handlers[i].info);
+                write_task(w, verb_names[i], task, handlers[i].info, told);
             }
         }
     }
     for (const auto& task : n.published.tasks()) {
         if (!n.tasks.tasks().contains(task)) {
-            write_task(w, to_string(verb::bind), task, {});
+            write_task(w, to_string(verb::bind), task, {}, told);
         }
     }
     w.end_array();
 }
 
-void write_description(json_writer& w, const node_state& n) {
+void write_description(json_writer& w, const node_state& n, told_tasks told) {
     w.begin_object();
     write_member(w, "node", std::string_view{n.name});
     if (!n.peers.pool().empty()) {
@@ -126,11 +143,19 @@ void write_description(json_writer& w, const node_state& n) {
         features.emplace_back("trace");
     }
     write_member(w, "features", features);
+    w.plain_key("limits"); // of what is sent to it
+    w.begin_object();
+    write_member(w, "line", std::uint64_t{n.bounds.line});
+    w.end_object();
     write_member(w, "epoch", std::string_view{n.epoch});
     write_member(w, "uptime_ms", milliseconds_since(n.started, n.time.now()));
     write_member(w, "endpoints", n.endpoints);
     w.key("tasks");
-    write_tasks(w, n);
+    if (told != told_tasks::none) {
+        write_tasks(w, n, told);
+    } else {
+        w.null(); // readers would take a list without entries, or none, for a node that offers nothing
+    }
     write_load_member(w, n.load_now());
     if (n.security) {
         write_member(w, "roster", std::uint64_t{n.security->roster_version()});
@@ -138,7 +163,7 @@ void write_description(json_writer& w, const node_state& n) {
     w.end_object();
 }
 
-void write_metrics(json_writer& w, const node_state& n) {
+void write_metrics(json_writer& w, const node_state& n, shown_counters shown) {
     const auto number = [&](std::string_view name, std::uint64_t value) { write_member(w, name, value); };
     auto counts = n.counts;
     counts.peers_known = n.peers.size();
@@ -154,7 +179,9 @@ void write_metrics(json_writer& w, const node_state& n) {
     static constexpr auto all = all_counters(detail::fields_of<counters>{});
     static_assert(all.size() + verb_count == sizeof(counters) / sizeof(std::uint64_t), "describe every counter");
     for (const auto& c : all) {
-        number(c.name, counts.*c.value);
+        if (counts.*c.value != 0 || shown == shown_counters::all) {
+            number(c.name, counts.*c.value);
+        }
     }
     w.key("memory");
     w.begin_object();
@@ -186,9 +213,16 @@ void serve_reserved(node_state& host, reply_writer& replies, const protocol::req
     const auto& parameters = r.noun.parameters;
     const auto is = [&r](verb v, std::string_view path) { return r.verb == v && r.noun.path == path; };
     if (is(verb::pull, "cles")) {
-        replies.write(r, [&](json_writer& w) { write_description(w, host); });
+        replies.write(r, [&](json_writer& w) {
+            if (replies.by_datagram()) {
+                w.raw(description_within(host, replies.longest()));
+            } else {
+                write_description(w, host);
+            }
+        });
     } else if (is(verb::pull, "cles/metrics")) {
-        replies.write(r, [&](json_writer& w) { write_metrics(w, host); });
+        const auto shown = replies.by_datagram() ? shown_counters::not_zero : shown_counters::all;
+        replies.write(r, [&](json_writer& w) { write_metrics(w, host, shown); });
     } else if (is(verb::pull, "cles/peers")) {
         serve_peers(host, replies, r, peer);
     } else if (is(verb::push, "cles/peers") && host.gossip_responder != nullptr) {

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/session.hpp"
 
-#include <cles/json_reader.hpp>
-#include <cles/pending.hpp>
-
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/session/request_checks.hpp"
 #include "protocol/line.hpp"

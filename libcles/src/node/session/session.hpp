@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "node/base/peer_reply.hpp"
 #include "node/publish/subscription.hpp"
 #include "node/security_protocol.hpp"
 #include "node/session/inbound.hpp"
@@ -9,6 +10,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace cles::core {
 
@@ -36,10 +38,16 @@ class session {
     [[gnu::cold]] void send_leave_notice();
     /// States the version of this node's roster.
     [[gnu::cold]] void send_hello();
+    /// Asks a publisher, whose updates the peer passes on, for its epoch (`link_security::ask`). \pre the node is
+    /// secured
+    [[gnu::cold]] void ask_publisher(const std::string& publisher, time_point due, peer_reply::function then) {
+        secured_->ask(publisher, due, std::move(then));
+    }
     /// Answers a line with `busy`, and does nothing else.
     [[gnu::cold]] void reject(std::string_view line);
     [[nodiscard]] inbound& serving() noexcept { return inbound_; }
     [[nodiscard]] outbound& asking() noexcept { return outbound_; }
+    [[nodiscard]] const outbound& asking() const noexcept { return outbound_; }
     [[nodiscard]] subscriptions& bound() noexcept { return subscriptions_; }
     /// This node opened the link: the peer may refuse it as a whole, with a `busy` that answers no request.
     void expect_refusal() noexcept { may_be_refused_ = true; }

@@ -33,7 +33,8 @@ class sharing_driver final : private work_sharing::client, public work_sharing {
     }
     std::uint64_t forward(const forwarding_permit& permit, const protocol::outgoing_request& r, time_point due,
                           detail::pending_ptr reply, outbound::progress_function progress) override {
-        return host_.peer_channels().send({.target = permit.node()}, r, due, std::move(reply), std::move(progress));
+        return host_.peer_channels().send({.target = permit.node(), .forwarded = true}, r, due, std::move(reply),
+                                          std::move(progress));
     }
     void send_own(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply) override {
         host_.peer_channels().send({.target = r.target()}, r, due, std::move(reply), {});

@@ -5,6 +5,7 @@
 #include <cles/tracing.hpp>
 
 #include "json/json_members.hpp"
+#include "node/base/wrapped_operation.hpp"
 #include "node/node_state.hpp"
 #include "protocol/hex_number.hpp"
 
@@ -35,13 +36,13 @@ std::string_view task_in(std::string_view noun) noexcept {
 } // namespace
 
 /// A request that was sent: ends its span, and passes the outcome on.
-class span_log::sent_request final : public detail::pending {
+class span_log::sent_request final : public wrapped_operation {
   public:
     sent_request(std::shared_ptr<span_log> log, std::uint64_t span, time_point begun, detail::pending_ptr operation)
-        : log_(std::move(log)), span_(span), over_(begun), operation_(std::move(operation)) {}
+        : wrapped_operation(std::move(operation)), log_(std::move(log)), span_(span), over_(begun) {}
     sent_request(const sent_request&) = delete;
     sent_request& operator=(const sent_request&) = delete;
-    ~sent_request() { log_->end(span_, outcome_, over_); }
+    ~sent_request() override { log_->end(span_, outcome_, over_); }
 
     verdict offer(std::string_view json) override {
         return complete([&](detail::pending& p) { return p.offer(json); });
@@ -53,32 +54,25 @@ class span_log::sent_request final : public detail::pending {
         return complete([&](detail::pending& p) { return p.offer_granted(json, grant); });
     }
     void fail(boost::system::error_code code, std::string_view message) override {
-        const std::unique_ptr<sent_request> self{this};
         note(code);
-        operation_.release()->fail(code, message);
+        wrapped_operation::fail(code, message);
     }
     void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override {
         const std::unique_ptr<sent_request> self{this};
         note(code);
-        operation_.release()->refuse(code, message, answer);
+        take_operation().release()->refuse(code, message, answer);
     }
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return operation_->calls_user(); }
 
   private:
     // The user's code may end the node: the time is read before.
     template <class Offer>
     verdict complete(Offer offer) {
-        std::unique_ptr<sent_request> self{this};
         const auto before = std::exchange(over_, log_->time_.now());
         outcome_ = "ok";
-        auto* const operation = operation_.release();
-        const auto found = offer(*operation);
-        if (found == verdict::malformed) {
-            operation_.reset(operation);
+        const auto found = pass_on(std::move(offer));
+        if (found == verdict::malformed) { // else this is destroyed
             over_ = before;
             outcome_ = nobody_waits;
-            static_cast<void>(self.release());
         }
         return found;
     }
@@ -94,7 +88,6 @@ class span_log::sent_request final : public detail::pending {
     std::uint64_t span_;
     time_point over_;
     std::string_view outcome_ = nobody_waits;
-    detail::pending_ptr operation_;
 };
 
 protocol::trace_context span_log::receive(const protocol::request_line& r, time_point arrived, time_point now) {

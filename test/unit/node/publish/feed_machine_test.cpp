@@ -205,6 +205,30 @@ BOOST_AUTO_TEST_CASE(a_marked_value_is_delivered_as_an_update_if_it_is_new) {
     BOOST_TEST(next() == "(nothing)");
 }
 
+BOOST_AUTO_TEST_CASE(a_value_is_told_with_its_mark) {
+    static_cast<void>(begin());
+    feed.on_bound("{\"v\":2}", {}, seventh);
+    struct marked_wait final : cles::detail::pending_event {
+        bool deliver(const cles::detail::raw_event& event) override {
+            kind = event.kind;
+            mark = {.seq = event.seq, .epoch = event.epoch};
+            return true;
+        }
+        void fail(boost::system::error_code, std::string_view) override {}
+        void discard() noexcept override {}
+        feed_event kind = feed_event::lost;
+        cles::update_mark mark{};
+    } w;
+    BOOST_REQUIRE(feed.mail().next(event_ptr{&w}));
+    feed.mail().pump();
+    BOOST_TEST((w.kind == feed_event::current));
+    BOOST_TEST((w.mark == seventh));
+    BOOST_TEST(!feed.mail().next(event_ptr{&w}));
+    update(8, "5f3a09c1");
+    BOOST_TEST((w.kind == feed_event::update));
+    BOOST_TEST((w.mark == cles::update_mark{.seq = 8, .epoch = seventh.epoch}));
+}
+
 BOOST_AUTO_TEST_CASE(a_refusal_of_the_first_bind_closes_it) {
     const auto result = begin();
     feed.on_refused(errc::no_task, "car1 has no BIND 'speed'", clock.now());

@@ -42,6 +42,19 @@ BOOST_AUTO_TEST_CASE(all_bindings_end_with_the_link) {
     BOOST_TEST(link.session().serving().bindings() == 0U);
 }
 
+// It was bound; later, a rule of the publisher has changed.
+BOOST_AUTO_TEST_CASE(what_the_publisher_denies_later_is_denied) {
+    link.ask("BIND car2:pose id=7");
+    ways.bound("car2:pose").binds("{}");
+    link.take();
+    BOOST_TEST(link.denials == 0);
+    ways.bound("car2:pose").to->on_denied({.code = cles::errc::denied, .message = "car2: not you"});
+    BOOST_TEST(link.denials == 1);
+    BOOST_TEST(link.kind("BIND car2:pose id=8") == "id=8 denied");
+    ways.bound("car2:pose").binds("{}"); // it has changed again
+    BOOST_TEST(link.kind("BIND car2:pose id=9") == "id=9 ok");
+}
+
 // However it ends, and whenever the other node replies.
 BOOST_AUTO_TEST_CASE(binding_of_an_ended_call_is_not_accounted) {
     const auto is_idle = [&] {

@@ -47,7 +47,8 @@ BOOST_AUTO_TEST_CASE(entries_that_are_not_tasks_are_skipped) {
 BOOST_AUTO_TEST_CASE(invalid_description_has_no_list) {
     for (const std::string_view text :
          {"", "[]", "{}", "{\"node\":\"car2\",\"tasks\":[]}", "{\"node\":\"car1\",\"tasks\":{}}",
-          "{\"node\":\"car1\",\"tasks\":[1]}", "{\"node\":\"car1\",\"tasks\":[{\"verb\":1}]}", "{\"node\":\"car1\""}) {
+          "{\"node\":\"car1\",\"tasks\":null}", "{\"node\":\"car1\",\"tasks\":[1]}",
+          "{\"node\":\"car1\",\"tasks\":[{\"verb\":1}]}", "{\"node\":\"car1\""}) {
         BOOST_TEST(!read_task_list(text, "car1"), text);
     }
 }

@@ -42,6 +42,12 @@ BOOST_AUTO_TEST_CASE(a_node_confirms_its_epoch) {
     BOOST_TEST(answer.find("\"roster\":7") != std::string::npos, answer);
 }
 
+BOOST_AUTO_TEST_CASE(a_node_that_announces_itself_to_nobody_says_what_it_signs) {
+    node.host->tasks.add(cles::verb::bind, "control", {.info = {.must_be_signed = true}});
+    const auto answer = link.ask("PULL car1:cles/announced/" + challenge + " id=7");
+    BOOST_TEST(answer.find(R"("signed":["control"])") != std::string::npos, answer);
+}
+
 BOOST_AUTO_TEST_CASE(it_is_exempt_from_rights) {
     security->denied = {"car2 PULL car1:cles/announced/" + challenge};
     BOOST_TEST(link.kind("PULL car1:cles/announced/" + challenge + " id=7") == "id=7 ok");

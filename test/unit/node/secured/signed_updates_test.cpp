@@ -197,15 +197,39 @@ BOOST_AUTO_TEST_CASE(a_signature_that_is_not_needed_must_hold_too) {
     BOOST_TEST(own.bodies.size() == 1U);
 }
 
-BOOST_AUTO_TEST_CASE(a_forwarded_one_needs_an_announcement) {
+BOOST_AUTO_TEST_CASE(a_forwarded_one_without_an_announcement_counts_as_its_publisher_has_confirmed) {
     link.session().bound().add(relayed);
     link.ask(update("car2", 1));
-    link.ask(update("car2", 2, "car2"));
-    BOOST_TEST(relayed.bodies.empty());
-    BOOST_TEST(refused() == 2U);
-    announce("car2", {});
-    link.ask(update("car2", 3));
     BOOST_TEST(relayed.bodies.size() == 1U);
+    node.secured().confirmed().confirm("car2", {.epoch = 0x5f3a09c2, .signed_tasks = {"control"}}, node.clock.now());
+    link.ask(update("car2", 2));
+    link.ask(update("car2", 2, "sat1"));
+    BOOST_TEST(refused() == 2U);
+    link.ask(update("car2", 2, "car2"));
+    BOOST_TEST(relayed.bodies.size() == 2U);
+    announce("car2", {}); // it says so itself, and later
+    link.ask(update("car2", 3));
+    BOOST_TEST(relayed.bodies.size() == 3U);
+}
+
+BOOST_AUTO_TEST_CASE(what_another_instance_of_this_member_has_confirmed_counts) {
+    listener same{"car1", "control", false, 16};
+    link.session().bound().add(same);
+    node.secured().confirmed().confirm("car1", {.epoch = 0x5f3a09c2, .signed_tasks = {"control"}}, node.clock.now());
+    link.ask(update("car1", 1));
+    BOOST_TEST(refused() == 1U);
+    link.ask(update("car1", 2, "car1"));
+    BOOST_TEST(same.bodies.size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(what_the_peer_has_confirmed_of_an_earlier_epoch_does_not_count) {
+    link.session().bound().add(own);
+    node.secured().confirmed().confirm("sat1", {.epoch = 0x5f3a09c1, .signed_tasks = {"control"}}, node.clock.now());
+    link.ask(update("sat1", 1));
+    BOOST_TEST(own.bodies.size() == 1U);
+    node.secured().confirmed().confirm("sat1", {.epoch = 0x5f3a09c2, .signed_tasks = {"control"}}, node.clock.now());
+    link.ask(update("sat1", 2));
+    BOOST_TEST(refused() == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(a_forwarder_that_alters_it_is_noticed) {
@@ -240,10 +264,10 @@ BOOST_AUTO_TEST_SUITE_END()
 BOOST_AUTO_TEST_SUITE(in_the_group)
 
 BOOST_AUTO_TEST_CASE(a_publisher_must_have_announced_itself) {
-    hear(update("car2", 1));
+    hear(update("car3", 1));
     BOOST_TEST(refused() == 1U);
-    announce("car2", {});
-    hear(update("car2", 2));
+    announce("car3", {});
+    hear(update("car3", 2));
     BOOST_TEST(received() == 1U);
     BOOST_TEST(asked.of_others == 1);
     BOOST_TEST(asked.of_signed == 0);
@@ -256,6 +280,15 @@ BOOST_AUTO_TEST_CASE(a_listed_task_needs_a_signature) {
     BOOST_TEST(refused() == 2U);
     BOOST_TEST(received() == 0U);
     hear(update("car2", 3, "car2"));
+    BOOST_TEST(received() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(or_have_confirmed_that_epoch) {
+    hear(update("car2", 1));
+    BOOST_TEST(received() == 1U);
+    node.secured().confirmed().confirm("car2", {.epoch = 0x5f3a09c1}, node.clock.now());
+    hear(update("car2", 2));
+    BOOST_TEST(refused() == 1U);
     BOOST_TEST(received() == 1U);
 }
 

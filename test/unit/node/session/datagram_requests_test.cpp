@@ -73,6 +73,34 @@ BOOST_AUTO_TEST_CASE(an_update_of_several_lines_is_dropped_in_the_middle_of_a_st
                "update car2:x 1 {}; update car2:x 2 {}; update car2:x 3 {}; gap car2:x 1; update car2:x 5 {}; ");
 }
 
+BOOST_AUTO_TEST_CASE(the_description_of_a_node_fits) {
+    const auto told = [&] { return link.ask("PULL car1:cles id=9223372036854775807"); };
+    const auto add = [&](int number) {
+        node.host->tasks.add(verb::pull, "task" + std::to_string(number),
+                             {.info = {.description = std::string(100, 'd')},
+                              .plain = [](const cles::request&, cles::json_writer& w) { w.value(true); }});
+    };
+    BOOST_TEST(told().find("\"tasks\":[") != std::string::npos);
+    for (int i = 0; i < 12; ++i) {
+        add(i);
+    }
+    BOOST_TEST(told().find("\"task\":\"task11\"") != std::string::npos);
+    BOOST_TEST(told().find("ddd") == std::string::npos);
+    for (int i = 12; i < 100; ++i) {
+        add(i);
+    }
+    BOOST_TEST(told().find("\"node\":\"car1\"") != std::string::npos);
+    BOOST_TEST(told().find("\"tasks\":null") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(counters_that_are_0_are_left_out_of_the_metrics) {
+    cles::test::test_link stream{node};
+    BOOST_TEST(stream.ask("PULL car1:cles/metrics").find("\"errors\":0,") != std::string::npos);
+    BOOST_TEST(link.ask("PULL car1:cles/metrics").find("\"errors\"") == std::string::npos);
+    BOOST_TEST(link.kind("PULL car1:nothing id=7") == "id=7 no_task");
+    BOOST_TEST(link.ask("PULL car1:cles/metrics").find("\"errors\":1,") != std::string::npos);
+}
+
 BOOST_AUTO_TEST_CASE(a_datagram_over_the_limit_is_too_large_and_the_source_goes_on) {
     link.overlong("PULL car1:speed id=7 " + std::string(1200, 'x'));
     const auto lines = link.take_lines();

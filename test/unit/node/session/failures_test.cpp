@@ -20,7 +20,7 @@ BOOST_AUTO_TEST_CASE(a_missing_task_is_named) {
 
 BOOST_AUTO_TEST_CASE(too_large_names_the_limit) {
     const cles::test::test_node node;
-    BOOST_TEST(overlong(*node.host, 0).message == "car1: a line has at most 1048576 bytes");
+    BOOST_TEST(overlong(*node.host, 0).message == "car1: a line has at most 1048576 bytes (limits.line)");
     BOOST_TEST(overlong(*node.host, 1200).message == "car1: a datagram has at most 1200 bytes: use TCP");
 }
 

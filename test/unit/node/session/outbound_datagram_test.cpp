@@ -85,6 +85,21 @@ BOOST_AUTO_TEST_CASE(a_job_whose_deadline_passes_is_cancelled_at_the_peer) {
     BOOST_TEST(node.host->deadlines.size() == 0U);
 }
 
+// No link ends from which the peer could learn it.
+BOOST_AUTO_TEST_CASE(jobs_and_forwarded_requests_are_cancelled_at_the_peer_when_the_node_stops) {
+    send(901, verb::delegate);
+    send(902, verb::pull);
+    cles::test::send_on(link, node, {.verb = verb::pull, .noun = "car2:speed", .id = 903, .adverbs = "hops=7 via=car1"},
+                        5s);
+    link.take();
+    link.session().asking().stop();
+    auto sent = link.take_lines();
+    std::sort(sent.begin(), sent.end());
+    BOOST_REQUIRE(sent.size() == 2U);
+    BOOST_TEST(sent[0].starts_with("PUSH self:cles/cancel/5000000901 id="), sent[0]);
+    BOOST_TEST(sent[1].starts_with("PUSH self:cles/cancel/5000000903 id="), sent[1]);
+}
+
 BOOST_AUTO_TEST_CASE(a_repeated_reply_is_dropped) {
     const auto result = send(1);
     link.ask("id=5000000001 [1]");

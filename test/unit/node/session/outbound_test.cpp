@@ -73,6 +73,157 @@ BOOST_AUTO_TEST_CASE(a_request_over_the_limit_on_a_line_is_not_sent) {
     BOOST_TEST(just_fits->text == "{}");
 }
 
+// -- what the peer reads -------------------------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(a_request_that_the_peer_would_not_read_is_refused_by_its_limit) {
+    link.session().asking().release("car2", 300);
+    const auto push = [&](std::uint64_t id, std::size_t size) {
+        const std::string head = "PUSH car2:speed id=1 ";
+        return send_on(
+            link, node,
+            {.verb = verb::push, .noun = "car2:speed", .id = id, .body = std::string(size - head.size(), '1')});
+    };
+    const auto just_fits = push(1, 300);
+    BOOST_TEST(link.take().size() == 301U);
+    const auto too_long = push(2, 301);
+    node.pass(0ms);
+    BOOST_TEST((too_long->code == errc::too_large));
+    BOOST_TEST(too_long->text == "car2 reads requests of at most 300 bytes (its limits.line)");
+    BOOST_TEST(link.take().empty());
+    BOOST_TEST(!just_fits->ended);
+}
+
+BOOST_AUTO_TEST_CASE(the_own_limit_holds_where_the_peer_reads_more) {
+    link.session().asking().release("car2", std::size_t{1} << 40U);
+    const std::string body(node.host->bounds.line, '1');
+    const auto too_long = send_on(link, node, {.verb = verb::push, .noun = "car2:speed", .id = 2, .body = body});
+    node.pass(0ms);
+    BOOST_TEST((too_long->code == errc::too_large));
+    BOOST_TEST(too_long->text == "a request has at most 1048576 bytes (limits.line)");
+}
+
+struct held_request : fixture {
+    std::shared_ptr<outcome> push(std::uint64_t id, std::size_t size, verb v = verb::push) {
+        return send_on(link, node, {.verb = v, .noun = "car2:speed", .id = id, .body = std::string(size, '1')}, 1s);
+    }
+};
+
+// Short ones lose no time: every node reads them.
+BOOST_FIXTURE_TEST_CASE(until_the_peer_has_said_what_it_reads_long_requests_wait_and_keep_their_order, held_request) {
+    link.session().asking().hold();
+    push(1, 10);
+    BOOST_TEST(link.take() == "PUSH car2:speed id=1 deadline=1000 1111111111\n");
+    push(2, 300);
+    const auto longest = push(3, 500);
+    push(4, 10);
+    BOOST_TEST(link.take() == "");
+    BOOST_TEST(in_flight() == 4U);
+    link.session().asking().release("car2", 400);
+    node.pass(0ms);
+    BOOST_TEST(link.take() == "PUSH car2:speed id=2 deadline=1000 " + std::string(300, '1') +
+                                  "\nPUSH car2:speed id=4 deadline=1000 1111111111\n");
+    BOOST_TEST((longest->code == errc::too_large));
+    push(5, 300);
+    BOOST_TEST(link.take().starts_with("PUSH car2:speed id=5 "));
+}
+
+BOOST_FIXTURE_TEST_CASE(a_peer_that_does_not_say_what_it_reads_gets_everything, held_request) {
+    link.session().asking().hold();
+    push(1, 5000);
+    link.session().asking().release();
+    BOOST_TEST(link.take().starts_with("PUSH car2:speed id=1 "));
+}
+
+BOOST_FIXTURE_TEST_CASE(a_request_that_waits_ends_like_others_and_leaves_nothing_at_the_peer, held_request) {
+    link.session().asking().hold();
+    const auto cancelled = push(1, 300, verb::delegate);
+    const auto late = push(2, 300, verb::delegate);
+    BOOST_TEST(link.session().asking().cancel(1));
+    BOOST_TEST((cancelled->code == errc::cancelled));
+    node.pass(1s);
+    BOOST_TEST((late->code == errc::deadline));
+    BOOST_TEST(link.session().asking().held_bytes() == 0U);
+    link.session().asking().release("car2", 4096);
+    BOOST_TEST(link.take() == "");
+    link.session().asking().hold();
+    const auto lost = push(3, 300);
+    BOOST_TEST(link.session().asking().held_bytes() > 300U);
+    link.reset();
+    BOOST_TEST((lost->code == errc::unavailable));
+    BOOST_TEST(link.session().asking().held_bytes() == 0U);
+}
+
+BOOST_FIXTURE_TEST_CASE(what_the_peer_says_of_a_request_that_it_has_not_got_does_not_count, held_request) {
+    auto& asking = link.session().asking();
+    asking.hold();
+    const auto waits = push(1, 300);
+    const auto held = asking.held_bytes();
+    link.ask("id=1 progress=0.5 {}");
+    link.ask("id=1 {}");
+    link.ask(R"(id=1 {"error":"failed","message":"car2: no"})");
+    BOOST_TEST(!waits->ended);
+    BOOST_TEST(dropped() == 3U);
+    BOOST_TEST(asking.held_bytes() == held);
+    asking.release();
+    BOOST_TEST(asking.held_bytes() == 0U);
+    BOOST_TEST(link.take().starts_with("PUSH car2:speed id=1 "));
+    link.ask("id=1 {}");
+    BOOST_TEST(waits->ended);
+}
+
+BOOST_AUTO_TEST_CASE(memory_for_requests_that_wait_is_limited) {
+    cles::test::test_node small{{.line = 40'000, .memory = 65'536}};
+    cles::test::test_link to{small};
+    to.session().asking().hold();
+    std::vector<std::shared_ptr<outcome>> all;
+    for (std::uint64_t id = 1; id <= 10; ++id) {
+        all.push_back(
+            send_on(to, small, {.verb = verb::push, .noun = "car2:speed", .id = id, .body = std::string(10'000, '1')}));
+    }
+    small.pass(0ms);
+    BOOST_TEST(!all.front()->ended);
+    BOOST_TEST((all.back()->code == errc::busy));
+}
+
+// -- a peer that ends the link because of a long line --------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(who_has_not_cancelled_is_not_told_so_because_anothers_request_was_too_long) {
+    const auto too_long = send(1);
+    const auto two = send(2, verb::delegate, 30s);
+    const auto three = send(3);
+    link.ask(R"(id=1 {"error":"too_large","message":"car2: a line has at most 300 bytes"})");
+    BOOST_TEST((too_long->code == errc::too_large));
+    link.ask(R"(id=2 {"error":"cancelled","message":"car2: the requester cancelled it"})");
+    BOOST_TEST((two->code == errc::unavailable));
+    BOOST_TEST(two->text.find("limits.line") != std::string::npos, two->text);
+    link.ask(R"(id=3 {"error":"cancelled","message":"car2: the requester cancelled it"})");
+    BOOST_TEST((three->code == errc::unavailable));
+}
+
+BOOST_AUTO_TEST_CASE(that_holds_if_the_long_request_has_ended_before) {
+    send(1);
+    const auto two = send(2);
+    link.session().asking().cancel(1);
+    link.ask(R"(id=1 {"error":"too_large","message":"car2: a line has at most 300 bytes"})");
+    link.ask(R"(id=2 {"error":"cancelled","message":"car2: the requester cancelled it"})");
+    BOOST_TEST((two->code == errc::unavailable));
+}
+
+BOOST_AUTO_TEST_CASE(what_a_handler_calls_cancelled_stays_so) {
+    send(1);
+    const auto two = send(2);
+    const auto three = send(3);
+    link.ask(R"(id=1 {"error":"too_large","message":"car2: the result is too long","ran":true})");
+    link.ask(R"(id=2 {"error":"cancelled","message":"car2: no"})");
+    BOOST_TEST((two->code == errc::cancelled));
+    send(4);
+    send(5);
+    link.ask(R"(id=4 {"error":"too_large","message":"car2: no"})");
+    link.ask("id=5 {}"); // the link goes on
+    link.ask(R"(id=3 {"error":"cancelled","message":"car2: no"})");
+    BOOST_TEST((three->code == errc::cancelled));
+}
+
 BOOST_AUTO_TEST_CASE(a_deadline_other_than_the_default_is_sent_to_the_peer) {
     send(1, verb::pull, 1500ms);
     send(2, verb::delegate, 5s);
@@ -128,6 +279,20 @@ BOOST_AUTO_TEST_CASE(other_requests_are_not_cancelled_at_their_deadline) {
         node.pass(200ms);
         BOOST_TEST(link.take() == "");
     }
+}
+
+BOOST_AUTO_TEST_CASE(a_forwarded_request_whose_deadline_passes_is_cancelled_at_the_peer) {
+    for (const auto v : {verb::pull, verb::push, verb::delegate}) {
+        send_on(link, node, {.verb = v, .noun = "car2:speed", .id = 7, .adverbs = "hops=7 via=car1"}, 200ms);
+        link.take();
+        node.pass(200ms);
+        BOOST_TEST(link.take() == "PUSH self:cles/cancel/7 reply=no\n");
+    }
+    send_on(link, node, {.verb = verb::pull, .noun = "car2:speed", .id = 8, .adverbs = "hops=7 via=car1"}, 200ms);
+    link.ask("id=8 {}");
+    link.take();
+    node.pass(200ms);
+    BOOST_TEST(link.take() == "");
 }
 
 BOOST_AUTO_TEST_CASE(a_failure_has_its_code_and_the_peers_message) {
