@@ -29,8 +29,10 @@ class job_taker {
 
     /// Whether no more jobs are wanted.
     [[nodiscard]] virtual bool full() const noexcept = 0;
-    /// Whether it takes that job. \param ahead how many jobs start before it. May be called while the queue is locked.
-    [[nodiscard]] virtual bool choose(const core::call& job, std::size_t ahead) = 0;
+    /// Whether it takes that job. May be called while the queue is locked. \param ahead how many jobs start before it
+    /// \param service_time how long a job of its task holds a worker here; 0: not known
+    [[nodiscard]] virtual bool choose(const core::call& job, std::size_t ahead,
+                                      std::chrono::microseconds service_time) = 0;
     /// Sends a chosen job, which the queue has removed, to the node. Its outcome is passed to the requester.
     /// \param ended called once, not inside this call: `true` if the node has refused the job before it began, so that
     /// it has to be put back into the queue, at its old place; `false` if it has been answered
@@ -49,7 +51,7 @@ class shareable_queue {
         std::uint32_t waiting = 0;                 ///< jobs that have not started
         std::uint32_t idle = 0;                    ///< workers that will take some of them at once
         std::uint32_t workers = 0;                 ///< that are not stuck
-        std::chrono::microseconds service_time{0}; ///< how long a job holds a worker; 0: not known
+        std::chrono::microseconds service_time{0}; ///< how long a job has lately held a worker; 0: not known
         std::uint32_t movable = 0;                 ///< of the waiting jobs, those that `job_sharing::may_move`
         std::uint64_t movable_queued = 0;          ///< how many such jobs have been queued so far
         bool draining = false;                     ///< no more jobs are accepted

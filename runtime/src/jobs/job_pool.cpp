@@ -37,7 +37,8 @@ std::string seconds(std::chrono::nanoseconds span) {
 // that nothing is known.
 std::chrono::microseconds expected_service_time(const worker_pool::figures& workers) noexcept {
     constexpr std::chrono::microseconds most = 1'000s;
-    const auto known = std::max(workers.service_time, workers.saturated_for);
+    const auto known = workers.saturated_for.count() == 0 ? workers.recent_service_time
+                                                          : std::max(workers.service_time, workers.saturated_for);
     return std::min(std::chrono::ceil<std::chrono::microseconds>(known), most);
 }
 
@@ -291,9 +292,10 @@ shareable_queue::state job_dispatcher::read_state() const {
 void job_dispatcher::offer(job_taker& to) {
     const auto taken = workers_.take(
         most_offered,
-        [&](const job_record& r, std::size_t ahead) {
+        [&](const job_record& r, std::size_t ahead, std::chrono::nanoseconds service_time) {
             const auto* const call = r.requester_ ? r.requester_->node_call().get() : nullptr;
-            return call != nullptr && to.choose(*call, ahead);
+            return call != nullptr &&
+                   to.choose(*call, ahead, std::chrono::ceil<std::chrono::microseconds>(service_time));
         },
         [&] { return to.full(); });
     for (auto* r : taken) {

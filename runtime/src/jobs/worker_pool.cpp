@@ -278,7 +278,8 @@ void worker_pool::work() {
             resume(job); // as before
             break;
         }
-        service_time_.add(ended - now);
+        service_time_.add(ended - now, ended);
+        task_times_.add(job.task(), ended - now, ended);
         now = ended;
         done = &job;
         job.state = job_record::run_state::idle;
@@ -341,6 +342,7 @@ worker_pool::figures worker_pool::read_figures() const noexcept {
     result.running = busy_;
     result.usable = static_cast<std::uint32_t>(watchdog_.usable());
     result.service_time = service_time_.value();
+    result.recent_service_time = service_time_.recent(now);
     if (busy_ >= watchdog_.allowed()) {
         result.saturated_for = std::max<std::chrono::nanoseconds>(now - last_begin_, {});
     }

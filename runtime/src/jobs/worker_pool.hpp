@@ -59,8 +59,8 @@ class worker_pool {
     void wake();
     /// Removes a job that has not started. False if it has.
     bool withdraw(job_record& job);
-    /// Removes movable jobs: those that `choose(job, ahead)` returns true for, in the order in which they would start,
-    /// until `full()` does. \param most how many are looked at, among 16 times as many jobs
+    /// Removes movable jobs: those that `choose(job, ahead, service_time)` returns true for, in the order in which they
+    /// would start, until `full()` does. \param most how many are looked at, among 16 times as many jobs
     template <class Choose, class Full>
     [[nodiscard]] std::vector<job_record*> take(std::size_t most, Choose choose, Full full);
     /// Queues a job that `take` has removed, at its old place. False after `close`.
@@ -104,9 +104,10 @@ class worker_pool {
         std::uint32_t movable = 0;        ///< of these
         std::uint64_t movable_queued = 0; ///< since the start
         std::uint32_t running = 0;
-        std::uint32_t usable = 0;                  ///< workers that are not stuck
-        std::chrono::nanoseconds service_time{0};  ///< how long a job holds a worker; zero before the first job
-        std::chrono::nanoseconds saturated_for{0}; ///< for how long all workers have been busy; zero if one is free
+        std::uint32_t usable = 0;                        ///< workers that are not stuck
+        std::chrono::nanoseconds service_time{0};        ///< how long a job holds a worker; zero before the first job
+        std::chrono::nanoseconds recent_service_time{0}; ///< the same; zero also if no job has ended lately
+        std::chrono::nanoseconds saturated_for{0};       ///< how long all workers have been busy; zero if one is free
     };
     [[nodiscard]] figures read_figures() const noexcept;
 
@@ -133,6 +134,7 @@ class worker_pool {
     std::uint32_t busy_ = 0;
     time_point last_begin_; // of a job
     service_time service_time_;
+    task_times task_times_;
     figures counts_;      // its first three
     bool paused_ = false; // no job or continuation starts
     bool closed_ = false; // no job starts
@@ -150,7 +152,7 @@ std::vector<job_record*> worker_pool::take(std::size_t most, Choose choose, Full
         auto& job = static_cast<job_record&>(each);
         if (job.movable) {
             --left;
-            if (choose(job, ahead)) {
+            if (choose(job, ahead, task_times_.of(job.task()))) {
                 taken.push_back(&job);
             }
         }

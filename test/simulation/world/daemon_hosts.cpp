@@ -6,22 +6,24 @@
 
 namespace cles::simulation {
 
-void daemon_hosts::add_pool(node_run& n, bool shares) {
+void daemon_hosts::add_pool(node_run& n, bool shares, const work_pool::options& how) {
     auto& pool = pools_[n.host()];
-    pool = std::make_shared<work_pool>(n, most_queued_);
+    pool = std::make_shared<work_pool>(n, how, &idle_);
     if (shares) {
         pool->share();
     }
 }
 
 void daemon_hosts::offer(node_run& n, verb how, const std::string& task, bool idempotent) {
-    const auto start = [this, pool = pools_.at(n.host())](const request& r, const std::shared_ptr<core::call>& c) {
+    const auto start = [this, task, pool = pools_.at(n.host())](const request& r,
+                                                                const std::shared_ptr<core::call>& c) {
         const auto op = r.parameter<std::uint32_t>(0);
         if (fault() == planted::call_kept && kept_ == nullptr) {
             kept_ = c;
         }
         auto what = order_of(r, op);
         what.answer = c;
+        what.task = task;
         what.work = std::chrono::milliseconds{r.parameter<unsigned>(1)};
         what.begun = [this, op] { requests_.note_run(op); };
         pool->submit(std::move(what));

@@ -18,11 +18,12 @@ namespace cles::simulation {
 class daemon_hosts : public node_hosts {
   protected:
     daemon_hosts(std::uint64_t seed, planted fault, std::size_t most_queued)
-        : node_hosts(seed, fault), most_queued_(most_queued) {}
+        : node_hosts(seed, fault), pool_{.most_queued = most_queued} {}
     ~daemon_hosts() { end_all(); }
 
     /// Gives a new node its workers. \param shares they share their jobs with those of other nodes
-    void add_pool(node_run& n, bool shares);
+    void add_pool(node_run& n, bool shares) { add_pool(n, shares, pool_); }
+    void add_pool(node_run& n, bool shares, const work_pool::options& how);
     /// The workers run that task, whose parameters begin with the number of the request and its work in milliseconds.
     void offer(node_run& n, verb how, const std::string& task, bool idempotent);
     /// How the pool is to run a request, except for what all requests have in common.
@@ -35,9 +36,10 @@ class daemon_hosts : public node_hosts {
 
     ledger requests_{watcher_, time_};
     work_report report_;
+    idle_meter idle_{time_};
 
   private:
-    const std::size_t most_queued_; // of each node
+    const work_pool::options pool_; // of each node
     std::map<unsigned, std::shared_ptr<work_pool>> pools_;
     std::shared_ptr<core::call> kept_; // by a planted fault
 };

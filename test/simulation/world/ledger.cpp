@@ -38,16 +38,13 @@ std::uint32_t ledger::add(entry what) {
     return static_cast<std::uint32_t>(entries_.size());
 }
 
-detail::pending_ptr ledger::operation(std::uint32_t op) {
-    return when_ended([this, op](std::string_view) { end(op).succeeded = true; },
-                      [this, op](errc code, std::string_view why) {
-                          auto& e = end(op);
-                          e.code = code;
-                          e.why = why;
-                      });
+detail::pending_ptr ledger::operation(std::uint32_t op, std::function<void()> then) {
+    return when_ended(
+        [this, op, then](std::string_view) { end(op, {.succeeded = true}, then); },
+        [this, op, then](errc code, std::string_view why) { end(op, {.code = code, .why = std::string{why}}, then); });
 }
 
-ledger::entry& ledger::end(std::uint32_t op) {
+void ledger::end(std::uint32_t op, const entry& how, const std::function<void()>& then) {
     auto& e = entries_.at(op - 1);
     if (++e.ends != 1) {
         complain(rule::ends_in_time, op, "ended again");
@@ -55,7 +52,12 @@ ledger::entry& ledger::end(std::uint32_t op) {
     if (time_.now() > e.deadline) {
         complain(rule::ends_in_time, op, "ended after its deadline");
     }
-    return e;
+    e.succeeded = how.succeeded;
+    e.code = how.code;
+    e.why = how.why;
+    if (then) {
+        then();
+    }
 }
 
 void ledger::judge() const {

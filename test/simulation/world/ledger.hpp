@@ -9,6 +9,7 @@
 #include "simulation/world/work_report.hpp"
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -39,8 +40,8 @@ class ledger {
     [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }
     [[nodiscard]] const entry& of(std::uint32_t op) const { return entries_.at(op - 1); }
     void note_run(std::uint32_t op) { ++entries_.at(op - 1).ran; }
-    /// Records the end of that request.
-    detail::pending_ptr operation(std::uint32_t op);
+    /// Records the end of that request. \param then called afterwards; may be null
+    detail::pending_ptr operation(std::uint32_t op, std::function<void()> then = {});
 
     /// All should have ended.
     void judge() const;
@@ -50,7 +51,7 @@ class ledger {
     }
 
   private:
-    entry& end(std::uint32_t op);
+    void end(std::uint32_t op, const entry& how, const std::function<void()>& then);
 
     witness& watcher_;
     const agenda& time_;

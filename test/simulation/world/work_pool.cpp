@@ -19,10 +19,19 @@ namespace {
 constexpr milliseconds watch_every{50};
 constexpr milliseconds to_stop{5};
 
+// When a thread has answered, one time in eight the system runs others before it.
+constexpr unsigned interrupted_per_mille = 125;
+constexpr std::chrono::microseconds to_become_free{10};
+constexpr std::chrono::microseconds longest_interruption{2'000};
+
 } // namespace
 
-work_pool::work_pool(node_run& host, std::size_t most_queued)
-    : host_(host), most_queued_(most_queued), queue_(host.fault() == planted::queue_boundless ? 1'000 : most_queued) {}
+work_pool::work_pool(node_run& host, const options& how, idle_meter* meter)
+    : host_(host), how_(how), meter_(meter), chance_(host.host()),
+      queue_(host.fault() == planted::queue_boundless ? 1'000 : how.most_queued),
+      watch_(how.workers, replacements, grace) {
+    update_meter();
+}
 
 void work_pool::submit(order what) {
     const auto refuse = [&](milliseconds retry) {
@@ -45,6 +54,7 @@ void work_pool::submit(order what) {
         refuse(runtime::retry_delay(queue_.size(), watch_.usable(), service_time_.value()));
         return;
     }
+    update_meter();
     j.what = std::move(what);
     j.what.answer->on_stop(if_alive(weak_from_this(), [number](work_pool& self) { self.stop(number); }));
     if (!std::exchange(burst_end_posted_, true)) {
@@ -62,6 +72,9 @@ void work_pool::crash() {
     }
     jobs_.clear();
     on_drained_ = nullptr;
+    if (meter_ != nullptr) {
+        meter_->change(metered_, {});
+    }
     host_.crash();
     sharing_.reset();
 }
@@ -76,12 +89,13 @@ void work_pool::work() {
     while (at_work_ < watch_.allowed()) {
         auto* next = queue_.pop();
         if (next == nullptr) {
-            return;
+            break;
         }
         auto& j = static_cast<job&>(*next);
         ++at_work_;
         j.at_work = true;
         j.begun = host_.now();
+        last_begin_ = j.begun;
         j.due = j.what.answer->due();
         j.place = watch_.enter();
         watch_.begin(j.place, &j, j.begun, j.due);
@@ -91,6 +105,7 @@ void work_pool::work() {
             host_.later(watch_every, [self = shared_from_this()] { self->watch(); });
         }
     }
+    update_meter();
 }
 
 void work_pool::end(std::uint64_t number) {
@@ -99,15 +114,39 @@ void work_pool::end(std::uint64_t number) {
         return; // it was told to stop, and did
     }
     const auto& j = *found->second;
-    service_time_.add(host_.now() - j.begun);
+    const auto took = host_.now() - j.begun;
+    service_time_.add(took, host_.now());
+    service_times_[j.what.task].add(took, host_.now());
     watch_.end(j.place);
-    watch_.leave(j.place);
-    --at_work_;
+    const auto place = j.place;
     const auto answer = j.what.answer;
     jobs_.erase(found);
+    if (!how_.lingers) {
+        watch_.leave(place);
+        --at_work_;
+    }
     answer->done("{}");
+    if (how_.lingers) {
+        const auto span = chance_.chance(interrupted_per_mille) ? chance_.within(longest_interruption) : to_become_free;
+        host_.later(span, [self = shared_from_this(), place] { self->free_worker(place); });
+    }
     work();
     report_change();
+}
+
+void work_pool::free_worker(std::size_t place) {
+    watch_.leave(place);
+    --at_work_;
+    work();
+    report_change();
+}
+
+std::size_t work_pool::idle() const noexcept { return watch_.usable() - std::min(at_work_, watch_.usable()); }
+
+void work_pool::update_meter() {
+    if (meter_ != nullptr) {
+        meter_->change(metered_, {.idle = idle(), .waiting = queue_.movable()});
+    }
 }
 
 void work_pool::stop(std::uint64_t number) {
@@ -123,6 +162,7 @@ void work_pool::stop(std::uint64_t number) {
         }
         host_.later({}, [keep = std::move(j.what.answer)] {}); // its requester is being notified
         jobs_.erase(found);
+        update_meter();
         update_drain(false);
         return;
     }
@@ -162,11 +202,14 @@ void work_pool::report_change() {
 
 shareable_queue::state work_pool::read_state() const {
     const auto usable = watch_.usable();
-    const auto busy = host_.fault() == planted::slots_overstated ? 0 : std::min(at_work_, usable);
+    const auto free = host_.fault() == planted::slots_overstated ? usable : idle();
+    const auto saturated_for = at_work_ >= watch_.allowed() ? host_.now() - last_begin_ : std::chrono::nanoseconds{0};
     return {.waiting = static_cast<std::uint32_t>(queue_.size()),
-            .idle = static_cast<std::uint32_t>(usable - busy),
+            .idle = static_cast<std::uint32_t>(free),
             .workers = static_cast<std::uint32_t>(usable),
-            .service_time = std::chrono::ceil<std::chrono::microseconds>(service_time_.value()),
+            .service_time = std::chrono::ceil<std::chrono::microseconds>(
+                saturated_for.count() == 0 ? service_time_.recent(host_.now())
+                                           : std::max<std::chrono::nanoseconds>(service_time_.value(), saturated_for)),
             .movable = static_cast<std::uint32_t>(queue_.movable()),
             .movable_queued = queue_.movable_queued(),
             .draining = draining_};
@@ -176,7 +219,9 @@ void work_pool::offer(job_taker& to) {
     std::vector<job*> taken;
     queue_.visit([&](runtime::job_queue::item& each, std::size_t ahead) {
         auto& j = static_cast<job&>(each);
-        if (j.movable && to.choose(*j.what.answer, ahead)) {
+        const auto known = service_times_.find(j.what.task);
+        const auto service_time = known != service_times_.end() ? known->second.value() : std::chrono::nanoseconds{0};
+        if (j.movable && to.choose(*j.what.answer, ahead, std::chrono::ceil<std::chrono::microseconds>(service_time))) {
             taken.push_back(&j);
         }
         return !to.full();
@@ -184,6 +229,7 @@ void work_pool::offer(job_taker& to) {
     for (auto* j : taken) {
         queue_.remove(*j);
     }
+    update_meter();
     for (auto* j : taken) {
         if (!j->what.answer->wanted().grantee.empty()) {
             complain(rule::effects_once, "passes on a job that has moved already");
@@ -207,6 +253,7 @@ void work_pool::end_move(std::uint64_t number, bool refused) {
     if (refused || host_.fault() == planted::moved_run_again) {
         j.returned = true;
         queue_.put_back(j);
+        update_meter();
         host_.later({}, [self = shared_from_this()] { self->work(); });
         return;
     }
@@ -249,11 +296,11 @@ void work_pool::fail_open_jobs() {
 
 void work_pool::check() {
     const auto returned = [](const auto& each) { return each.second->returned && each.second->queued(); };
-    if (queue_.size() > most_queued_ &&
-        queue_.size() > most_queued_ + static_cast<std::size_t>(std::ranges::count_if(jobs_, returned))) {
+    if (queue_.size() > how_.most_queued &&
+        queue_.size() > how_.most_queued + static_cast<std::size_t>(std::ranges::count_if(jobs_, returned))) {
         complain(rule::bounded, "has " + std::to_string(queue_.size()) + " jobs waiting");
     }
-    if (at_work_ > workers + replacements) {
+    if (at_work_ > how_.workers + replacements) {
         complain(rule::bounded, "has " + std::to_string(at_work_) + " workers at work");
     }
     if (host_.frozen() || host_.was_frozen_until_now()) {

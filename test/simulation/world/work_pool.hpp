@@ -8,6 +8,8 @@
 #include "jobs/service_time.hpp"
 #include "jobs/worker_watchdog.hpp"
 #include "node/session/call.hpp"
+#include "simulation/network/dice.hpp"
+#include "simulation/world/idle_meter.hpp"
 #include "simulation/world/node_run.hpp"
 
 #include <chrono>
@@ -25,16 +27,22 @@ namespace cles::simulation {
 /// worker_pool and job_dispatcher of the runtime, and must be kept consistent with them.
 class work_pool final : public std::enable_shared_from_this<work_pool>, private shareable_queue {
   public:
-    static constexpr std::size_t workers = 2;
     static constexpr std::size_t replacements = 1;
     static constexpr std::chrono::milliseconds grace{300};
 
-    /// \param most_queued how many jobs may wait
-    explicit work_pool(node_run& host, std::size_t most_queued = 5);
+    struct options {
+        std::size_t workers = 2;
+        std::size_t most_queued = 5; ///< how many jobs may wait
+        /// A worker becomes free some time after its job has been answered, as a thread does.
+        bool lingers = false;
+    };
+    /// \param meter learns how many workers are idle while jobs wait; null: nobody does
+    work_pool(node_run& host, const options& how, idle_meter* meter = nullptr);
 
     struct order {
         std::uint64_t requester = 0;
         std::shared_ptr<core::call> answer;
+        std::string task{};
         std::chrono::milliseconds work{0};
         bool heeds = true; ///< stops when it is told to
         std::string body{};
@@ -71,6 +79,9 @@ class work_pool final : public std::enable_shared_from_this<work_pool>, private 
 
     void work();
     void end(std::uint64_t number);
+    void free_worker(std::size_t place);
+    [[nodiscard]] std::size_t idle() const noexcept;
+    void update_meter();
     void stop(std::uint64_t number);
     void watch();
     void fail_open_jobs();
@@ -83,11 +94,16 @@ class work_pool final : public std::enable_shared_from_this<work_pool>, private 
     void complain(rule which, const std::string& what);
 
     node_run& host_;
-    const std::size_t most_queued_;
+    const options how_;
+    idle_meter* const meter_;
+    idle_meter::figures metered_;
+    dice chance_;
     runtime::job_queue queue_;
-    runtime::worker_watchdog watch_{workers, replacements, grace};
+    runtime::worker_watchdog watch_;
     runtime::service_time service_time_;
-    std::map<std::uint64_t, std::unique_ptr<job>> jobs_; // by number
+    std::map<std::string, runtime::service_time, std::less<>> service_times_; // by task
+    time_point last_begin_{};                                                 // of a job
+    std::map<std::uint64_t, std::unique_ptr<job>> jobs_;                      // by number
     std::uint64_t last_number_ = 0;
     std::size_t at_work_ = 0;
     std::size_t sent_ = 0;

@@ -293,12 +293,18 @@ void scatter_gather::ask_all(time_point now) {
     const auto then = [this, self = shared_from_this()](part& at) {
         return [this, self, &at](std::string_view json, subrequest_failure* why) { on_outcome(at, json, why); };
     };
+    auto marked = *request_; // for nodes that share their jobs; a pool asks its nodes itself
+    std::string via;
+    if (marked.verb == verb::delegate) {
+        via = via_of_part(request_->via);
+        marked.via = via;
+    }
     part* own = nullptr;
     for (auto at = parts_.begin(); at != parts_.end() && !ended_; ++at) {
         if (at->node == routing_->host().name) {
             own = &*at;
         } else if (at->is_open()) {
-            at->ticket = routing_->send(*request_, origin_, at->node, by, then(*at));
+            at->ticket = routing_->send(at->pool.empty() ? marked : *request_, origin_, at->node, by, then(*at));
         }
     }
     if (own != nullptr && !ended_) { // last, since its handler may do anything

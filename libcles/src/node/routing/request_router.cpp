@@ -204,7 +204,8 @@ void request_router::on_offers() {
 }
 
 protocol::failure request_router::no_hops_left(const protocol::request_line& r) const {
-    const auto forwarded = r.via.empty() ? 0 : std::ranges::count(r.via, ',') + 1;
+    const auto named = r.via.empty() ? 0 : std::ranges::count(r.via, ',') + 1;
+    const auto forwarded = named - (is_in_via(r.via, "all") ? 1 : 0); // of a part for all nodes
     const auto most = static_cast<std::int64_t>(protocol::max_hops);
     auto advice = "state a greater one, at most " + std::to_string(most);
     if (auto* const routes = node_->gossip_responder) {

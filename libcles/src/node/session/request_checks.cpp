@@ -25,6 +25,8 @@ bool is_in_via(std::string_view via, std::string_view name) {
 
 namespace {
 
+constexpr std::string_view all_nodes = "all";
+
 // Who it is at the other end of a link of a secured node.
 std::string_view member_at(const node_state& n, const identity& peer) {
     return peer.transport == "inproc" ? std::string_view{n.name} : peer.name;
@@ -35,6 +37,14 @@ std::string not_allowed(const node_state& n, verb how, std::string_view path) {
 }
 
 } // namespace
+
+std::string via_of_part(std::string_view via) {
+    return std::string{all_nodes}.append(via.empty() ? "" : ",").append(via);
+}
+
+bool is_part_of_all(const protocol::request_line& r) {
+    return r.noun.target == all_nodes || is_in_via(r.via, all_nodes);
+}
 
 request_origin origin_of(const node_state& n, const identity& peer, const protocol::request_line& r) {
     if (!n.security) {

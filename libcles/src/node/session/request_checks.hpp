@@ -40,6 +40,12 @@ using protocol::failure_text;
 /// Whether `name` is in the comma-separated list `via`.
 bool is_in_via(std::string_view via, std::string_view name);
 
+/// `via` of a part of a request for `all`: it begins with that name, which no node has.
+[[gnu::cold]] std::string via_of_part(std::string_view via);
+/// Whether the request is a part of one for `all`, at the node that was asked or at another one. It is for this node
+/// only: at another one, which has a part of its own, it would run twice.
+bool is_part_of_all(const protocol::request_line& request);
+
 /// Whose a request is: that of the member that it states with `from`, if the peer may forward for that one; the peer's
 /// if it states none. Nobody's if the peer may not state that member, or is not authenticated itself; and without
 /// security. Views of `n`, `peer` and `request`.

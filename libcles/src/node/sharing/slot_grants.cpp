@@ -5,23 +5,46 @@
 
 namespace cles::core {
 
-std::uint64_t slot_grants::open(std::string_view to, std::uint64_t number, unsigned slots, unsigned reserved,
-                                time_point now) {
+std::uint64_t slot_grants::open(std::string_view to, std::uint64_t number, unsigned slots, time_point now) {
     auto& given = grants_[std::string{to}];
     if (now >= given.expires) {
         given = {.number = number, .previous = given.number};
     }
     given.slots = std::min(given.slots + slots, given.used + max_slots);
-    given.reserved += reserved;
     given.expires = now + valid_for;
     return given.number;
+}
+
+void slot_grants::reserve(std::string_view to, unsigned slots, time_point until, time_point now) {
+    if (const auto found = grants_.find(to); found != grants_.end() && slots != 0) {
+        auto& all = found->second.reserved;
+        std::erase_if(all, [now](const reservation& each) { return each.until <= now; });
+        all.push_back({.until = until, .slots = slots});
+    }
+}
+
+// The oldest first, since their jobs should have come by now.
+void slot_grants::grant::unreserve(unsigned count) {
+    for (auto& each : reserved) {
+        const auto ended = std::min(count, each.slots);
+        each.slots -= ended;
+        count -= ended;
+    }
+    std::erase_if(reserved, [](const reservation& each) { return each.slots == 0; });
 }
 
 void slot_grants::unreserve(std::string_view by, std::uint64_t number, unsigned slots) {
     const auto found = grants_.find(by);
     if (found != grants_.end() && found->second.number == number) {
-        auto& given = found->second;
-        given.reserved -= std::min(slots, given.reserved);
+        found->second.unreserve(slots);
+    }
+}
+
+void slot_grants::arrived(std::string_view by, std::uint64_t number, time_point now) {
+    if (const auto found = grants_.find(by); found != grants_.end() && found->second.number == number) {
+        auto& all = found->second.reserved;
+        std::erase_if(all, [now](const reservation& each) { return each.until <= now; });
+        found->second.unreserve(1);
     }
 }
 
@@ -46,21 +69,20 @@ void slot_grants::use(std::string_view by) {
 unsigned slot_grants::reserved(time_point now) const {
     unsigned all = 0;
     for (const auto& [node, given] : grants_) {
-        all += given.left(now);
+        for (const auto& each : given.reserved) {
+            all += now < each.until ? each.slots : 0;
+        }
     }
     return all;
-}
-
-unsigned slot_grants::reserved_for(std::string_view node, time_point now) const {
-    const auto found = grants_.find(node);
-    return found != grants_.end() ? found->second.left(now) : 0;
 }
 
 std::optional<time_point> slot_grants::next_expiry(time_point now) const {
     std::optional<time_point> next;
     for (const auto& [node, given] : grants_) {
-        if (given.left(now) != 0 && (!next || given.expires < *next)) {
-            next = given.expires;
+        for (const auto& each : given.reserved) {
+            if (now < each.until && (!next || each.until < *next)) {
+                next = each.until;
+            }
         }
     }
     return next;

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace cles::core {
 
@@ -19,9 +20,11 @@ class slot_grants {
     static constexpr unsigned max_slots = 1024; ///< of one grant
 
     /// Grants slots to a node, besides those that it has. \param number of a new grant, at random and not 0
-    /// \param reserved how many of them it will probably use
     /// \return the number of the grant
-    std::uint64_t open(std::string_view to, std::uint64_t number, unsigned slots, unsigned reserved, time_point now);
+    std::uint64_t open(std::string_view to, std::uint64_t number, unsigned slots, time_point now);
+    /// Keeps workers free for so many of the slots, because the node will probably use them by then. Each reservation
+    /// has its own end: renewing the grant does not prolong it.
+    void reserve(std::string_view to, unsigned slots, time_point until, time_point now);
     /// So many of the reserved slots are not used now. They stay valid.
     void unreserve(std::string_view by, std::uint64_t number, unsigned slots);
 
@@ -32,29 +35,32 @@ class slot_grants {
     };
     /// Checks the grant of a job, forwarded by that node.
     [[nodiscard]] verdict check(std::string_view by, std::uint64_t number, time_point now) const;
+    /// A job has come on that grant, and will be accepted or refused: what was reserved for it is free again.
+    void arrived(std::string_view by, std::uint64_t number, time_point now);
     /// Uses a slot of a valid grant.
     void use(std::string_view by);
 
-    /// Slots that are reserved, and have not been used yet.
+    /// Slots that are reserved for jobs that have not come yet.
     [[nodiscard]] unsigned reserved(time_point now) const;
-    [[nodiscard]] unsigned reserved_for(std::string_view node, time_point now) const;
-    /// When the next grant with reserved slots expires; nothing if there is none.
+    /// When the next reservation ends; nothing if there is none.
     [[nodiscard]] std::optional<time_point> next_expiry(time_point now) const;
     /// The node is gone.
     void forget(std::string_view node);
 
   private:
+    struct reservation {
+        time_point until{};
+        unsigned slots = 0;
+    };
     struct grant {
         std::uint64_t number = 0;
         std::uint64_t previous = 0; // the one before, which has expired
         unsigned slots = 0;
-        unsigned reserved = 0; // of these
         unsigned used = 0;
         time_point expires{};
+        std::vector<reservation> reserved{}; // the oldest first
 
-        [[nodiscard]] unsigned left(time_point now) const noexcept {
-            return now < expires && reserved > used ? reserved - used : 0;
-        }
+        void unreserve(unsigned count);
     };
 
     std::map<std::string, grant, std::less<>> grants_; // the last of each node

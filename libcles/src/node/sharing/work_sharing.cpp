@@ -28,6 +28,9 @@ void smooth(std::optional<microseconds>& average, microseconds sample) {
 
 microseconds elapsed(time_point since, time_point now) { return std::chrono::duration_cast<microseconds>(now - since); }
 
+/// How long a node should wait that has no free worker for a job on a grant: its next grant may come at once.
+constexpr std::chrono::milliseconds next_slot_retry{1};
+
 std::string_view task_of(const movable_request& r) { return r.path().substr(0, r.path().find('/')); }
 
 template <class Write>
@@ -61,7 +64,7 @@ void work_sharing::withdraw_all() {
 std::optional<movable_request> work_sharing::movable(const protocol::request_line& r, const task_info& task,
                                                      const identity& peer) {
     if (r.verb != verb::delegate || r.hops == 0 || r.grant != 0 || r.text.size() > longest_moved || task.local ||
-        task.must_be_signed) {
+        task.must_be_signed || is_part_of_all(r)) {
         return std::nullopt;
     }
     const auto by = origin_of(node_, peer, r);
@@ -107,15 +110,15 @@ std::optional<protocol::failure> work_sharing::use_grant(const protocol::request
         ++node_.counts.granted_jobs_refused;
         return protocol::failure{.code = code, .message = node_.name + " " + why};
     };
-    // The sender's next grant may come at once.
     const auto busy = [&](const std::string& why) {
         auto failure = refused(errc::busy, why);
-        failure.retry_ms = 1;
+        failure.retry_ms = static_cast<std::uint64_t>(next_slot_retry.count());
         return failure;
     };
     if (node_.security && by != peer.name) {
         return refused(errc::denied, "has not granted this: the last node in 'via' is not the peer");
     }
+    granted_.arrived(by, r.grant, now); // even if it is refused: its sender uses no other slot for it
     if (task.local) {
         return refused(errc::no_task, "takes no jobs of '" + std::string{r.noun.task} + "' from other nodes");
     }
@@ -124,9 +127,12 @@ std::optional<protocol::failure> work_sharing::use_grant(const protocol::request
                        "takes no jobs of '" + std::string{r.noun.task} + "' from other nodes: they are signed");
     }
     switch (granted_.check(by, r.grant, now)) {
-    case slot_grants::verdict::unknown:
-        return refused(errc::denied, "has not granted " + protocol::grant_text(r.grant) + " to " +
-                                         (by.empty() ? "the sender, which is not in 'via'" : std::string{by}));
+    case slot_grants::verdict::unknown: {
+        auto failure = refused(errc::denied, "has not granted " + protocol::grant_text(r.grant) + " to " +
+                                                 (by.empty() ? "the sender, which is not in 'via'" : std::string{by}));
+        failure.retry_ms = 1; // it is about this grant, which somebody else has made up, and not about the task
+        return failure;
+    }
     case slot_grants::verdict::over: return busy("has no slot left for this: the grant has expired, or is used up");
     case slot_grants::verdict::valid: break;
     }
@@ -145,22 +151,30 @@ std::string work_sharing::grant_another(std::string_view to) {
         return {};
     }
     auto& other = known_[std::string{to}];
-    if (const auto* first = most_loaded(now); first != nullptr && first->second.waiting > other.waiting) {
+    if (const auto* first = most_loaded(); first != nullptr && first->second.waiting > other.waiting) {
         return {};
     }
-    const bool has_more = other.waiting != 0; // then it will use the slot at once
-    other.waiting -= has_more ? 1 : 0;
-    return "grant=" + protocol::grant_text(open_grant(to, 1, has_more ? 1 : 0, now));
+    const auto number = open_grant(to, 1, now);
+    if (other.waiting != 0) { // then it will use the slot at once
+        --other.waiting;
+        granted_.reserve(to, 1, reserve_until(other, now), now);
+    }
+    return "grant=" + protocol::grant_text(number);
+}
+
+// There is no reply that says whether the slot is used.
+time_point work_sharing::reserve_until(const acquaintance& other, time_point now) const {
+    const auto span = other.trip ? 2 * *other.trip + reserved_for : microseconds{slot_grants::valid_for};
+    return now + std::min<microseconds>(span, slot_grants::valid_for);
 }
 
 bool work_sharing::read(std::string_view body, std::size_t depth, slots_message& to) {
     json_reader reader{body, depth};
     const bool valid = read_members(reader, [&](std::string_view key) {
-        return key == "node"         ? reader.read(to.node)
-               : key == "free"       ? read_count(reader, to.free)
-               : key == "waiting"    ? read_count(reader, to.waiting)
-               : key == "service_us" ? read_count(reader, to.service_us)
-                                     : reader.skip();
+        return key == "node"      ? reader.read(to.node)
+               : key == "free"    ? read_count(reader, to.free)
+               : key == "waiting" ? read_count(reader, to.waiting)
+                                  : reader.skip();
     });
     return valid && !to.node.empty();
 }
@@ -204,7 +218,6 @@ void work_sharing::serve_slots(reply_writer& replies, const protocol::request_li
     }
     ++node_.counts.grants_received;
     auto& held = hold(said.node, r.grant, said.free, now);
-    other.service_time = microseconds{said.service_us};
     const auto taken = forward_jobs(std::string{said.node}, held, now);
     const bool may_have_more = taken != 0 && held.left == 0;
     const auto waiting = may_have_more ? jobs_.read_state().excess() : 0;
@@ -244,19 +257,20 @@ class work_sharing::forwarding final : public job_taker {
   public:
     forwarding(work_sharing& by, const std::string& node, const held_grant& grant, const shareable_queue::state& own,
                time_point now)
-        : by_(by), node_(node), other_(by.known_[node]), grant_(grant), now_(now), own_(own) {
-        const auto slower = std::max(other_.service_time - own_.service_time, microseconds{0});
-        const std::chrono::duration<double, std::micro> transfer{other_.transfer(now)};
-        required_wait_ = min_wait_per_transfer * transfer + slower;
-    }
+        : by_(by), node_(node), other_(by.known_[node]), grant_(grant), now_(now), own_(own),
+          trip_(other_.trip.value_or(first_transfer)) {}
 
     [[nodiscard]] bool full() const noexcept override { return chosen_ == grant_.left; }
 
-    bool choose(const call& job, std::size_t ahead) override {
+    bool choose(const call& job, std::size_t ahead, microseconds service_time) override {
         if (job.ended() || job.movable() == nullptr) {
             return false;
         }
-        const bool chosen = is_worth_it(ahead);
+        const auto task = task_of(*job.movable());
+        if (task != last_task_) { // most jobs are of one task
+            look_up(task);
+        }
+        const bool chosen = is_worth_it(ahead, service_time);
         if ((!chosen && has_suitable_) || !is_suitable(*job.movable())) {
             return false;
         }
@@ -306,35 +320,45 @@ class work_sharing::forwarding final : public job_taker {
     [[nodiscard]] unsigned taken() const noexcept { return taken_; }
     /// Whether one of the jobs is for that node, worth a transfer or not.
     [[nodiscard]] bool has_suitable() const noexcept { return has_suitable_; }
+    /// Until when none is, if no more jobs come.
+    [[nodiscard]] time_point unsuitable_until() const noexcept { return std::min(now_ + look_every, retry_at_); }
 
   private:
-    [[nodiscard]] bool is_suitable(const movable_request& r) {
-        const auto task = task_of(r);
-        const auto refused = other_.refused.find(task);
-        return r.size() <= other_.longest && (refused == other_.refused.end() || refused->second <= now_) &&
-               offers(task) && !is_in_via(r.via(), node_) &&
-               may_pass_on(by_.node_, r.origin(), node_, verb::delegate, r.path()) == passage::permitted;
+    void look_up(std::string_view task) {
+        last_task_ = task;
+        const auto* const other = by_.find_neighbour(node_);
+        const auto tasks = other != nullptr ? other->tasks : nullptr;
+        last_is_offered_ =
+            tasks && std::ranges::any_of(tasks->entries, [&](const task_list::entry& each) {
+                return each.verb == verb::delegate && each.task == task && !each.local && !each.must_be_signed;
+            });
+        const auto known = other_.tasks.find(task);
+        last_ = known != other_.tasks.end() ? known->second : task_there{};
     }
-    // The first one for which there is no worker waits for half a job on average.
-    [[nodiscard]] bool is_worth_it(std::size_t ahead) const noexcept {
+    [[nodiscard]] bool is_suitable(const movable_request& r) {
+        if (!last_is_offered_ || r.size() > other_.longest || is_in_via(r.via(), node_) ||
+            may_pass_on(by_.node_, r.origin(), node_, verb::delegate, r.path()) != passage::permitted) {
+            return false;
+        }
+        const bool refused = now_ < last_.refused_until;
+        retry_at_ = refused ? std::min(retry_at_, last_.refused_until) : retry_at_;
+        return !refused;
+    }
+    // The first one for which there is no worker waits for half a job on average. What lies before it in the queue is
+    // estimated by what jobs have lately taken, or by those of its task if these take longer.
+    [[nodiscard]] bool is_worth_it(std::size_t ahead, microseconds service_time) const noexcept {
         if (ahead < own_.idle) {
             return false;
         }
-        const std::chrono::duration<double, std::micro> each{own_.service_time};
+        const std::chrono::duration<double, std::micro> each{std::max(own_.service_time, service_time)};
         const auto turns = static_cast<double>(ahead - own_.idle) + 0.5;
-        return each * turns / std::max<std::uint32_t>(own_.workers, 1) > required_wait_;
+        return each * turns / std::max<std::uint32_t>(own_.workers, 1) >
+               min_wait_per_transfer * trip_ + slower(service_time);
     }
-    [[nodiscard]] bool offers(std::string_view task) {
-        if (task != last_task_) { // most jobs are of one task
-            last_task_ = task;
-            const auto* const other = by_.find_neighbour(node_);
-            const auto tasks = other != nullptr ? other->tasks : nullptr;
-            last_is_offered_ =
-                tasks && std::ranges::any_of(tasks->entries, [&](const task_list::entry& each) {
-                    return each.verb == verb::delegate && each.task == task && !each.local && !each.must_be_signed;
-                });
-        }
-        return last_is_offered_;
+    // What a job of the last task takes longer there, as far as both are known.
+    [[nodiscard]] microseconds slower(microseconds service_time) const noexcept {
+        const bool known = last_.duration && now_ < last_.duration_until && service_time.count() != 0;
+        return known ? std::max(*last_.duration - trip_ - service_time, microseconds{0}) : microseconds{0};
     }
 
     work_sharing& by_;
@@ -343,9 +367,11 @@ class work_sharing::forwarding final : public job_taker {
     const held_grant grant_;
     const time_point now_;
     const shareable_queue::state own_;
-    std::chrono::duration<double, std::micro> required_wait_{};
+    const microseconds trip_;
     std::string last_task_;
     bool last_is_offered_ = false;
+    task_there last_;
+    time_point retry_at_ = time_point::max();
     bool has_suitable_ = false;
     unsigned chosen_ = 0;
     unsigned taken_ = 0;
@@ -363,7 +389,7 @@ unsigned work_sharing::forward_jobs(const std::string& node, held_grant& by, tim
     if (!on_grant.has_suitable()) {
         auto& other = known_[node];
         other.unsuitable = own.movable_queued;
-        other.unsuitable_until = now + look_every;
+        other.unsuitable_until = on_grant.unsuitable_until();
     }
     by.left = on_grant.has_suitable() ? by.left - on_grant.taken() : 0;
     return on_grant.taken();
@@ -371,8 +397,8 @@ unsigned work_sharing::forward_jobs(const std::string& node, held_grant& by, tim
 
 void work_sharing::use_held_grants(time_point now) {
     std::erase_if(held_, [&](const auto& one) { return one.second.left == 0 || now >= one.second.expires; });
-    for (auto& [node, grant] : held_) {
-        forward_jobs(node, grant, now);
+    for (auto& [key, grant] : held_) {
+        forward_jobs(key.first, grant, now);
     }
 }
 
@@ -388,8 +414,12 @@ void work_sharing::hold_another(std::uint64_t ticket, std::uint64_t grant) {
 // come.
 work_sharing::held_grant& work_sharing::hold(std::string_view by, std::uint64_t number, unsigned slots,
                                              time_point now) {
-    auto& held = held_[std::string{by}];
-    if (held.number != number || now >= held.expires) {
+    const std::pair key{std::string{by}, number};
+    if (!held_.contains(key)) {
+        make_room_for_grant(key.first);
+    }
+    auto& held = held_[key];
+    if (now >= held.expires) {
         held = {.number = number};
     }
     held.left = std::min(held.left + slots, slot_grants::max_slots);
@@ -398,34 +428,42 @@ work_sharing::held_grant& work_sharing::hold(std::string_view by, std::uint64_t 
     return held;
 }
 
-microseconds work_sharing::acquaintance::transfer(time_point now) const {
-    return std::max(trip.value_or(first_transfer), now < surplus_until ? *surplus : microseconds{0});
+// Nobody knows who has sent a grant without security: so a further one of the same node replaces no other, unless there
+// are many.
+void work_sharing::make_room_for_grant(const std::string& of) {
+    auto oldest = held_.end();
+    std::size_t known = 0;
+    for (auto at = held_.lower_bound({of, 0}); at != held_.end() && at->first.first == of; ++at) {
+        ++known;
+        oldest = oldest == held_.end() || at->second.expires < oldest->second.expires ? at : oldest;
+    }
+    if (known >= max_held) {
+        held_.erase(oldest);
+    }
 }
 
-// Until the reply, less the usual time of a job there. If that is not known, this job tells.
+// Until the reply. The node's own average would be of all its tasks, and from any time.
 void work_sharing::measure(const moved_job& moved, time_point now) {
     const auto found = known_.find(moved.node);
     if (found == known_.end()) {
         return;
     }
-    auto& other = found->second;
-    const auto took = elapsed(moved.sent, now);
-    if (other.service_time == microseconds{0}) {
-        other.service_time = took;
-        return;
+    auto& there = found->second.tasks[std::string{task_of(*moved.job->movable())}];
+    if (now >= there.duration_until) {
+        there.duration.reset();
     }
-    if (now >= other.surplus_until) {
-        other.surplus.reset();
-    }
-    smooth(other.surplus, took - other.service_time);
-    other.surplus_until = now + surplus_valid_for;
+    smooth(there.duration, elapsed(moved.sent, now));
+    there.duration_until = now + duration_valid_for;
 }
 
 // So that the job is not sent there again at once.
 void work_sharing::remember_refusal(const moved_job& moved, const protocol::failure& why, time_point now) {
-    const auto held = held_.find(moved.node);
-    if (why.code == errc::busy && held != held_.end() && held->second.number == moved.grant) {
-        held_.erase(held); // it has no more free workers
+    const bool is_about_grant = why.code == errc::denied && why.retry_ms;
+    if (why.code == errc::busy || is_about_grant) {
+        held_.erase({moved.node, moved.grant}); // it has no more free workers, or has not granted this
+    }
+    if (is_about_grant) {
+        return;
     }
     const auto found = known_.find(moved.node);
     if (found == known_.end()) {
@@ -437,7 +475,10 @@ void work_sharing::remember_refusal(const moved_job& moved, const protocol::fail
         return;
     }
     const auto retry = std::chrono::milliseconds{why.retry_ms.value_or(0)};
-    found->second.refused[std::string{task_of(request)}] =
+    if (why.code == errc::busy && retry <= next_slot_retry) {
+        return; // only that slot was refused
+    }
+    found->second.tasks[std::string{task_of(request)}].refused_until =
         now + (why.code == errc::busy ? std::min(retry, max_retry) : refusal_valid_for);
 }
 
@@ -520,12 +561,11 @@ void work_sharing::look_at_loads(time_point now) {
     }
 }
 
-// The node with the most jobs, except those whose slots are reserved already; null if there is none.
-work_sharing::acquaintances::value_type* work_sharing::most_loaded(time_point now) {
+// The node with the most jobs for which it has no slots yet; null if there is none.
+work_sharing::acquaintances::value_type* work_sharing::most_loaded() {
     acquaintances::value_type* most = nullptr;
     for (auto& one : known_) {
-        const auto& [name, other] = one;
-        if (other.waiting > (most != nullptr ? most->second.waiting : 0) && granted_.reserved_for(name, now) == 0) {
+        if (one.second.waiting > (most != nullptr ? most->second.waiting : 0)) {
             most = &one;
         }
     }
@@ -535,7 +575,7 @@ work_sharing::acquaintances::value_type* work_sharing::most_loaded(time_point no
 // The most loaded ones first, each for the jobs that it may have.
 void work_sharing::grant_slots(unsigned slots, const shareable_queue::state& own, time_point now) {
     slots = std::min(slots, slot_grants::max_slots);
-    for (acquaintances::value_type* to = nullptr; slots != 0 && (to = most_loaded(now)) != nullptr;) {
+    for (acquaintances::value_type* to = nullptr; slots != 0 && (to = most_loaded()) != nullptr;) {
         auto& [node, other] = *to;
         if (find_neighbour(node) == nullptr) {
             other.waiting = 0;
@@ -543,8 +583,10 @@ void work_sharing::grant_slots(unsigned slots, const shareable_queue::state& own
         }
         const auto given = std::min<unsigned>(slots, other.waiting);
         slots -= given;
-        push({.node = node, .grant = open_grant(node, given, given, now), .slots = given, .at = now},
-             object([&](json_writer& w) {
+        other.waiting -= given;
+        const auto number = open_grant(node, given, now);
+        granted_.reserve(node, given, now + slot_grants::valid_for, now); // the reply says which are used
+        push({.node = node, .grant = number, .slots = given, .at = now}, object([&](json_writer& w) {
                  write_member(w, "node", std::string_view{node_.name});
                  write_member(w, "free", std::uint64_t{given});
                  write_member(w, "service_us", static_cast<std::uint64_t>(own.service_time.count()));
@@ -552,10 +594,10 @@ void work_sharing::grant_slots(unsigned slots, const shareable_queue::state& own
     }
 }
 
-std::uint64_t work_sharing::open_grant(std::string_view to, unsigned slots, unsigned reserved, time_point now) {
+std::uint64_t work_sharing::open_grant(std::string_view to, unsigned slots, time_point now) {
     const auto number = (std::uint64_t{out_.random()} << 32U | out_.random()) | 1U;
     ++node_.counts.grants_sent;
-    return granted_.open(to, number, slots, reserved, now);
+    return granted_.open(to, number, slots, now);
 }
 
 // Nodes that seem to have a free worker first; the others may have become free since they reported their load. From a
@@ -651,7 +693,7 @@ void work_sharing::refresh_neighbours() {
         const bool gone = !node_.peers.address_of(one.first);
         if (gone) {
             granted_.forget(one.first);
-            held_.erase(one.first);
+            std::erase_if(held_, [&](const auto& grant) { return grant.first.first == one.first; });
         }
         return gone;
     });

@@ -24,6 +24,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::core {
@@ -69,8 +70,11 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     static constexpr std::chrono::microseconds first_transfer{1'000};
     /// The wait that a transfer saves has to exceed its duration by this factor.
     static constexpr double min_wait_per_transfer = 1.5;
-    /// How long the measured duration of transfers counts. So a long job does not end sharing.
-    static constexpr std::chrono::milliseconds surplus_valid_for{1'000};
+    /// How long it counts how long jobs of a task have taken at another node. So a long job does not end sharing.
+    static constexpr std::chrono::milliseconds duration_valid_for{1'000};
+    /// How long a slot that was granted with a result is reserved, besides two round trips. The other node uses it at
+    /// once or not at all.
+    static constexpr std::chrono::milliseconds reserved_for{2};
     /// How long a node is not asked to run jobs of a task that it has refused, unless it says when to retry.
     static constexpr std::chrono::milliseconds refusal_valid_for{1'000};
     static constexpr std::chrono::milliseconds max_retry{10'000};
@@ -79,6 +83,9 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     /// Longer requests do not move. The other node would refuse what is over its limit, and close the link. (Its limit
     /// is not known; this is less than the default.)
     static constexpr std::size_t longest_moved = limits{}.line - limits{}.line / 16;
+
+    /// How many grants of a node are kept at a time. It gives one; others may pose as it, without security.
+    static constexpr std::size_t max_held = 8;
 
     /// All of these outlive this.
     work_sharing(node_state& host, client& out, shareable_queue& jobs, std::uint32_t seed);
@@ -105,22 +112,23 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     class forwarding; // takes jobs on one grant
     class moved_reply;
 
+    /// What is known of the jobs of one task at another node.
+    struct task_there {
+        std::optional<std::chrono::microseconds> duration{}; // of a moved job, from here
+        time_point duration_until = time_point::min();       // it counts
+        time_point refused_until = time_point::min();
+    };
     /// What is known of another node.
     struct acquaintance {
-        std::uint32_t waiting = 0;                        // jobs there that may be moved
-        time_point heard = time_point::min();             // when it last said so
-        std::chrono::microseconds service_time{0};        // of a job there; 0: not known
-        std::optional<std::chrono::microseconds> trip;    // how long `PUSH cles/slots` takes there and back
-        std::optional<std::chrono::microseconds> surplus; // what moved jobs take longer than usual there
-        time_point surplus_until{};                       // it counts
-        time_point silent_until = time_point::min();      // it does not share its work, and is sent nothing
+        std::uint32_t waiting = 0;                     // jobs there that may be moved, without those of open grants
+        time_point heard = time_point::min();          // when it last said so
+        std::optional<std::chrono::microseconds> trip; // how long `PUSH cles/slots` takes there and back
+        time_point silent_until = time_point::min();   // it does not share its work, and is sent nothing
         // No job was for it when so many had been queued; so it is not told of them until then.
         std::uint64_t unsuitable = 0;
         time_point unsuitable_until = time_point::min();
-        std::size_t longest = longest_moved;                      // request that is sent to it
-        std::map<std::string, time_point, std::less<>> refused{}; // until when, by task
-
-        [[nodiscard]] std::chrono::microseconds transfer(time_point now) const;
+        std::size_t longest = longest_moved; // request that is sent to it
+        std::map<std::string, task_there, std::less<>> tasks{};
     };
     using acquaintances = std::map<std::string, acquaintance, std::less<>>;
     /// The body of `PUSH cles/slots`.
@@ -128,7 +136,6 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
         std::string_view node;
         std::uint32_t free = 0;
         std::uint32_t waiting = 0;
-        std::uint32_t service_us = 0;
     };
     /// A `PUSH cles/slots` that this node has sent.
     struct sent_slots {
@@ -158,8 +165,9 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
                                                            const identity& peer) const;
     void balance(time_point now);
     void grant_slots(unsigned slots, const shareable_queue::state& own, time_point now);
-    std::uint64_t open_grant(std::string_view to, unsigned slots, unsigned reserved, time_point now);
-    [[nodiscard]] acquaintances::value_type* most_loaded(time_point now);
+    std::uint64_t open_grant(std::string_view to, unsigned slots, time_point now);
+    [[nodiscard]] time_point reserve_until(const acquaintance& other, time_point now) const;
+    [[nodiscard]] acquaintances::value_type* most_loaded();
     void look_at_loads(time_point now);
     void tell(const shareable_queue::state& own, time_point now);
     void arm_timer(const shareable_queue::state& own, time_point now);
@@ -167,6 +175,7 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     void on_reply(const sent_slots& what, const peer_answer& found);
     unsigned forward_jobs(const std::string& node, held_grant& by, time_point now);
     void use_held_grants(time_point now);
+    void make_room_for_grant(const std::string& of);
     void hold_another(std::uint64_t ticket, std::uint64_t grant);
     held_grant& hold(std::string_view by, std::uint64_t number, unsigned slots, time_point now);
     void on_outcome(std::uint64_t ticket, std::string_view json, subrequest_failure* why);
@@ -183,8 +192,8 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     jitter draws_;
     slot_grants granted_;
     acquaintances known_;
-    std::map<std::string, held_grant, std::less<>> held_;
-    std::map<std::uint64_t, moved_job> moved_; // by ticket
+    std::map<std::pair<std::string, std::uint64_t>, held_grant> held_; // by node and number
+    std::map<std::uint64_t, moved_job> moved_;                         // by ticket
     std::uint64_t last_ticket_ = 0;
     time_point tell_at_ = time_point::min();                                             // not before
     time_point look_at_ = time_point::min();                                             // not before

@@ -107,7 +107,9 @@ BOOST_AUTO_TEST_CASE(with_the_right_to_forward_each_leads_out_and_states_the_req
                 const auto before = f.left();
                 f.link.ask(each.line.substr(0, each.line.find('{')) + " id=7");
                 BOOST_TEST(f.left() > before);
-                BOOST_TEST(text_of(f, each).find(" via=car1 from=sat1") != std::string::npos, text_of(f, each));
+                const std::string part = each.line.starts_with("DELEGATE all:") ? "all," : ""; // it must not move
+                BOOST_TEST(text_of(f, each).find(" via=" + part + "car1 from=sat1") != std::string::npos,
+                           text_of(f, each));
             }
         }
     }
@@ -146,6 +148,32 @@ BOOST_AUTO_TEST_CASE(without_the_right_to_forward_none_does) {
     f.submit("DELEGATE car1:work id=7");
     f.grant_to_car2();
     BOOST_TEST(f.queue.moved.empty());
+}
+
+// call_options::on_behalf_of: the node's own program asks at the node itself, and states the member.
+BOOST_AUTO_TEST_CASE(what_the_program_asks_on_behalf_of_a_member_takes_the_same_ways) {
+    for (const auto& each : ways_of_requests) {
+        for (const bool may_forward : {true, false}) {
+            BOOST_TEST_CONTEXT(each.line << (may_forward ? "" : " without the right")) {
+                fixture f;
+                if (!may_forward) {
+                    f.security->forwarders = {};
+                }
+                cles::test::test_link own{f.node, 0, std::string{}, "inproc"};
+                const auto before = f.left();
+                const auto reply = own.ask(each.line.substr(0, each.line.find('{')) + " id=7 from=sat1");
+                if (!may_forward) {
+                    BOOST_TEST(f.left() == before);
+                    BOOST_TEST(reply.find("car1 may not forward requests of sat1") != std::string::npos, reply);
+                    continue;
+                }
+                BOOST_TEST(f.left() > before);
+                const std::string part = each.line.starts_with("DELEGATE all:") ? "all," : "";
+                BOOST_TEST(text_of(f, each).find(" via=" + part + "car1 from=sat1") != std::string::npos,
+                           text_of(f, each));
+            }
+        }
+    }
 }
 
 BOOST_AUTO_TEST_CASE(none_leads_to_a_node_of_which_the_requester_may_not_ask_it) {

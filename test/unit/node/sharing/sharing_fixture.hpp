@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -42,7 +43,7 @@ class test_queue final : public shareable_queue {
         std::vector<std::size_t> wanted;
         for (std::size_t i = 0; i < waiting.size() && !to.full(); ++i) {
             ++offered;
-            if (to.choose(*waiting[i].call, i)) {
+            if (to.choose(*waiting[i].call, i, service_time_of(*waiting[i].call))) {
                 wanted.push_back(i);
             }
         }
@@ -65,7 +66,14 @@ class test_queue final : public shareable_queue {
         }
     }
 
+    [[nodiscard]] std::chrono::microseconds service_time_of(const core::call& job) const {
+        const auto* const r = job.movable();
+        const auto found = r != nullptr ? by_task.find(r->path().substr(0, r->path().find('/'))) : by_task.end();
+        return found != by_task.end() ? found->second : figures.service_time;
+    }
+
     state figures{.workers = 1, .service_time = std::chrono::milliseconds{10}};
+    std::map<std::string, std::chrono::microseconds, std::less<>> by_task; ///< service times that differ
     std::vector<job> waiting;
     std::vector<job> moved;
     int ended = 0;   ///< moved jobs that have been answered
