@@ -166,6 +166,20 @@ BOOST_AUTO_TEST_CASE(rules_do_not_permit_what_the_roster_does_not) {
     BOOST_TEST(made.rule->allows);
 }
 
+BOOST_AUTO_TEST_CASE(what_every_node_serves_is_exempt) {
+    const auto policy =
+        policy_of({limited("car1", {}, texts{}), limited("car2", texts{}, {})}, "deny * may * *:*/**\n");
+    for (const auto* const what : {"cancel/5", "hello", "leaving", "roster", "announced/x", "slots"}) {
+        const kept_noun noun{std::string{"car1:cles/"} + what};
+        BOOST_TEST((policy.received("car2", "", verb::push, noun.decoded).by == cause::exempt), what);
+    }
+    for (const auto* const other :
+         {"car1:cles", "car1:cles/peers", "car1:cles/x/slots", "car1:slots", "car1:x/slots"}) {
+        const kept_noun noun{other};
+        BOOST_TEST((policy.received("car2", "", verb::push, noun.decoded).by == cause::rule), other);
+    }
+}
+
 BOOST_AUTO_TEST_CASE(updates_count_as_bind) {
     const auto policy =
         policy_of({limited("car1", {}, texts{"bind *:target", "update *:log"}), limited("car2", {}, {})});

@@ -16,7 +16,7 @@ PARAMETER = r"(?:[A-Za-z0-9_.~+-]|%[0-9A-Fa-f]{2}|\*(?!\*))+"
 RIGHT = re.compile(rf"(\*|{VERB}(?:,{VERB})*) ({NAME}):({NAME})((?:/{PARAMETER})*)(/\*\*)?")
 RULE = re.compile(rf"(allow|deny)[ \t]+({NAME})[ \t]+(may|offers)[ \t]+([^ \t]+)[ \t]+([^ \t]+)")
 RESERVED = ("self", "any", "all")
-EXEMPT = ("cancel", "roster", "announced")
+EXEMPT = ("cancel", "hello", "leaving", "roster", "announced", "slots")
 
 
 def decode(text: str) -> str:

@@ -8,7 +8,9 @@
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -20,6 +22,7 @@ namespace {
 
 using namespace cles::security;
 using namespace cles::security::test;
+using namespace std::chrono_literals;
 using admission_class = cles::security::link_admission;
 using verdict = admission_class::verdict;
 using reason = admission_class::reason;
@@ -403,34 +406,161 @@ BOOST_AUTO_TEST_CASE(a_long_line_is_permitted_only_for_a_roster_that_was_announc
     BOOST_TEST(greeted()->admission->max_line() == 1024U);
 }
 
-BOOST_AUTO_TEST_CASE(few_unknown_keys_may_send_a_roster_at_the_same_time) {
-    const auto shared = car1().terms;
-    std::vector<std::unique_ptr<admission_class>> open;
-    const auto claim_newer = [&](const public_key& key) {
-        auto& made = *open.emplace_back(std::make_unique<admission_class>(shared));
-        std::string out;
-        made.begin(key, out);
-        out.clear();
-        const auto result = made.on_line(R"(PUSH self:cles/hello reply=no {"version":9,"epoch":"5f3a09c1"})", out);
-        return std::pair{result, out};
-    };
-    const auto unknown = key_of("unknown").public_part();
-    for (std::size_t i = 0; i < admission_terms::max_rosters_of_strangers; ++i) {
-        BOOST_TEST((claim_newer(unknown).first == verdict::pending));
-    }
-    const auto [refused, line] = claim_newer(unknown);
-    BOOST_TEST((refused == verdict::refused));
-    BOOST_TEST((open.back()->refused_for() == reason::busy));
-    BOOST_TEST(line.starts_with(R"({"error":"busy")"));
-    BOOST_TEST((claim_newer(key_of("car2").public_part()).first == verdict::pending)); // a member
+namespace {
 
-    open.erase(open.begin()); // its link ends
-    BOOST_TEST((claim_newer(unknown).first == verdict::pending));
+// A link from a host, whose other end has an unknown key and states a roster that is far newer.
+struct claim {
+    claim(const std::shared_ptr<admission_terms>& terms, std::string_view host, std::string_view key = "unknown")
+        : admission(terms, {}, host) {
+        admission.on_displaced([this](std::string_view line) { displaced = line; });
+        admission.begin(key_of(key).public_part(), out);
+        out.clear();
+        result = admission.on_line(R"(PUSH self:cles/hello reply=no {"version":4000000000,"epoch":"5f3a09c1"})", out);
+    }
+    verdict send_part(std::size_t size) { return result = admission.on_part(size, out); }
+
+    admission_class admission;
+    std::string out{};
+    std::string displaced{};
+    verdict result{};
+};
+
+} // namespace
+
+BOOST_AUTO_TEST_CASE(a_stated_version_uses_up_nothing) {
+    auto member = car1();
+    std::vector<std::unique_ptr<claim>> strangers;
+    for (int i = 0; i < 1000; ++i) {
+        auto& made = *strangers.emplace_back(std::make_unique<claim>(member.terms, "10.0.0.66"));
+        BOOST_TEST((made.result == verdict::pending));
+        BOOST_TEST((made.send_part(i < 500 ? 0 : admission_terms::short_roster) == verdict::pending));
+    }
+    BOOST_TEST(member.terms->rosters_of_strangers.size() == 0U);
+    authority.add(node("car3"));
+    end newcomer{"car3", authority.share(), "00000003"};
+    connect(member, newcomer);
+    BOOST_TEST((member.decision == verdict::admitted));
+}
+
+BOOST_AUTO_TEST_CASE(long_rosters_of_unknown_keys_are_limited_by_what_has_arrived) {
+    constexpr std::size_t is_long = admission_terms::long_rosters / 16;
+    const auto shared = car1().terms;
+    std::vector<std::unique_ptr<claim>> open;
+    const auto send_long = [&](std::string_view host, std::string_view key = "unknown") -> claim& {
+        auto& made = *open.emplace_back(std::make_unique<claim>(shared, host, key));
+        made.send_part(is_long);
+        return made;
+    };
+    for (int i = 0; i < 16; ++i) {
+        BOOST_TEST((send_long("10.0.0.1").result == verdict::pending));
+    }
+    auto& refused = send_long("10.0.0.1");
+    BOOST_TEST((refused.result == verdict::refused));
+    BOOST_TEST((refused.admission.refused_for() == reason::busy));
+    BOOST_TEST(refused.out.starts_with(R"({"error":"busy")"));
+    BOOST_TEST((send_long("10.0.0.1", "car2").result == verdict::pending)); // a member
+
+    BOOST_TEST((send_long("10.0.0.2").result == verdict::pending)); // another address, which has fewer
+    BOOST_TEST(open[0]->displaced.starts_with(R"({"error":"busy")"));
+    BOOST_TEST((open[0]->admission.refused_for() == reason::busy));
+    BOOST_TEST(open[1]->displaced.empty());
+    BOOST_TEST(shared->rosters_of_strangers.size() == 16U);
+    BOOST_TEST((open.back()->send_part(is_long) == verdict::pending)); // counts once
+    BOOST_TEST((open.back()->send_part(is_long + 1) == verdict::pending));
+    BOOST_TEST(shared->rosters_of_strangers.size() == 15U);
+    BOOST_TEST(open[1]->displaced.starts_with(R"({"error":"busy")"));
+    BOOST_TEST((open[2]->send_part(2 * is_long) == verdict::refused)); // its address has the most
+
+    BOOST_TEST((send_long("10.0.0.1").result == verdict::pending));
+    BOOST_TEST((send_long("10.0.0.1").result == verdict::refused));
+    open.erase(open.begin() + 3); // its link ends
+    BOOST_TEST((send_long("10.0.0.1").result == verdict::pending));
     std::string out;
-    open[0]->on_line("something else", out);
-    BOOST_TEST((claim_newer(unknown).first == verdict::pending));
+    open[3]->admission.on_line("something else", out);
+    BOOST_TEST((send_long("10.0.0.1").result == verdict::pending));
     open.clear();
-    BOOST_TEST(shared->rosters_of_strangers == 0U);
+    BOOST_TEST(shared->rosters_of_strangers.size() == 0U);
+    BOOST_TEST(shared->rosters_of_strangers.amount() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_network_of_64_bits_counts_as_one_address) {
+    const auto shared = car1().terms;
+    std::vector<std::unique_ptr<claim>> open;
+    for (int i = 0; i < 16; ++i) {
+        open.push_back(std::make_unique<claim>(shared, "2001:db8::" + std::to_string(i + 1)));
+        BOOST_TEST((open.back()->send_part(1'000'000) == verdict::pending));
+    }
+    claim more{shared, "2001:db8::ffff"};
+    BOOST_TEST((more.send_part(1'000'000) == verdict::refused));
+    claim elsewhere{shared, "2001:db8:0:1::1"};
+    BOOST_TEST((elsewhere.send_part(1'000'000) == verdict::pending));
+}
+
+BOOST_AUTO_TEST_CASE(handshakes_of_members_do_not_count) {
+    cles::time_point now{1h};
+    auto member = car1();
+    for (int i = 0; i < 5000; ++i) {
+        admission_class link{member.terms, {}, "10.0.0.2"};
+        BOOST_REQUIRE(link.take_handshake(now));
+        std::string out;
+        link.begin(key_of("car2").public_part(), out);
+        link.on_line(hello, out);
+        BOOST_REQUIRE((link.on_line(welcome, out) == verdict::admitted));
+    }
+    int taken = 0;
+    for (int i = 0; i < 5000; ++i) {
+        admission_class link{member.terms, {}, "10.0.0.66"};
+        taken += link.take_handshake(now) ? 1 : 0;
+    }
+    BOOST_TEST(taken == 4 + 256);
+    admission_class late{member.terms, {}, "10.0.0.66"};
+    BOOST_TEST(!late.take_handshake(now));
+    BOOST_TEST((late.refused_for() == reason::busy));
+    admission_class other{member.terms, {}, "10.0.0.67"};
+    BOOST_TEST(other.take_handshake(now));
+}
+
+// 200 addresses open 2,000 links a second, take part in the handshake, and send a long roster that never ends.
+// Meanwhile, new members bring newer rosters.
+BOOST_AUTO_TEST_CASE(a_flood_of_strangers_keeps_out_no_member_that_brings_a_newer_roster) {
+    struct stranger {
+        cles::time_point until;
+        std::unique_ptr<claim> link;
+    };
+    cles::time_point now{1h};
+    auto member = car1();
+    std::deque<stranger> strangers; // each link has five seconds to open
+    int number = 0;
+    int admitted = 0;
+    constexpr int newcomers = 100;
+    const auto flood = [&](std::chrono::microseconds span) {
+        for (const auto until = now + span; now < until; now += 500us, ++number) {
+            const auto host = "10.0.1." + std::to_string(number % 200);
+            auto made = std::make_unique<claim>(member.terms, host);
+            if (made->admission.take_handshake(now) && made->send_part(20'000) == verdict::pending) {
+                strangers.push_back({now + 5s, std::move(made)});
+            }
+            while (!strangers.empty() && strangers.front().until <= now) {
+                strangers.pop_front();
+            }
+        }
+    };
+    for (int i = 0; i < newcomers; ++i) {
+        flood(100ms);
+        const auto name = "new" + std::to_string(i);
+        authority.add(node(name));
+        claim newcomer{member.terms, "10.0.2." + std::to_string(i % 4), name};
+        const bool begun = newcomer.admission.take_handshake(now);
+        for (const std::size_t size : {20'000, 60'000, 100'000}) { // its roster arrives within 15 ms
+            newcomer.send_part(size);
+            flood(5ms);
+        }
+        if (begun && newcomer.displaced.empty() && newcomer.result == verdict::pending) {
+            newcomer.admission.on_line("PUSH self:cles/roster reply=no " + authority.newest().line(), newcomer.out);
+            admitted += newcomer.admission.on_line(welcome, newcomer.out) == verdict::admitted ? 1 : 0;
+        }
+    }
+    BOOST_TEST(admitted >= newcomers * 99 / 100);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -109,6 +109,7 @@ class sealed_node final : public datagram_sink {
     std::vector<established_session> established_log;
     std::vector<opened_line> opened_log;
     std::vector<datagram_source> gave_up_log;
+    std::vector<hello_refusal> refused_log;
     std::vector<bool> lost_log;                        ///< whether there was no earlier session
     std::optional<datagram_source> held;               ///< see `datagram_sink::holds`
     std::function<void(const opened_line&)> on_opened; ///< may be empty
@@ -122,6 +123,7 @@ class sealed_node final : public datagram_sink {
         gave_up_log.push_back(with);
         lost_log.push_back(lost);
     }
+    void refused(const datagram_source&, hello_refusal why) override { refused_log.push_back(why); }
     [[nodiscard]] bool holds(const datagram_source& which) const override { return held == which; }
 };
 

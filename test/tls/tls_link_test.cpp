@@ -16,6 +16,7 @@
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/test/data/monomorphic.hpp>
 #include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
@@ -48,7 +49,8 @@ using cles::tls::tls_errc;
 
 // A node: its fleet, and its transport.
 struct node_with_tls {
-    node_with_tls(std::string_view name, std::shared_ptr<const roster> known, std::chrono::milliseconds to_open = 5s)
+    node_with_tls(std::string_view name, std::shared_ptr<const roster> known, std::chrono::milliseconds to_open = 5s,
+                  const admission_terms::handshake_turns::bounds& handshakes = admission_terms::usual_handshakes)
         : of(std::make_shared<fleet>(std::string{name}, key_of(name), std::move(known))),
           transport(cles::tls::make_tls_transport({.fleet = of,
                                                    .epoch = "5f3a09c1",
@@ -57,7 +59,8 @@ struct node_with_tls {
                                                            reports.emplace_back(refused.why);
                                                            sources.emplace_back(refused.source);
                                                        },
-                                                   .time_to_open = to_open})) {}
+                                                   .time_to_open = to_open,
+                                                   .handshakes = handshakes})) {}
 
     std::shared_ptr<fleet> of;
     std::vector<std::string> reports{};
@@ -115,6 +118,12 @@ struct fixture {
         return failed;
     }
     [[nodiscard]] scripted_peer socket() { return {io, "tcp" + to_string(listener->local()).substr(3)}; }
+    // The same from another loopback address.
+    [[nodiscard]] scripted_peer socket_from(const char* address) {
+        boost::asio::ip::tcp::socket made{io, {boost::asio::ip::make_address(address), 0}};
+        made.connect({boost::asio::ip::make_address("127.0.0.1"), listener->local().port});
+        return {io, made.release()};
+    }
     void wait_for_accepted() {
         run_until(io, [&] { return !accepted.empty(); });
     }
@@ -122,8 +131,9 @@ struct fixture {
 
 // A client that a test plays step by step, over a bare socket.
 struct played_client {
-    played_client(fixture& with, const node_with_tls& of)
-        : io(with.io), socket(with.socket()), context(of.of->own_key()), terms(std::make_shared<admission_terms>()) {
+    played_client(fixture& with, const node_with_tls& of) : played_client(with, of, with.socket()) {}
+    played_client(fixture& with, const node_with_tls& of, scripted_peer by)
+        : io(with.io), socket(std::move(by)), context(of.of->own_key()), terms(std::make_shared<admission_terms>()) {
         terms->fleet = of.of;
         terms->epoch = "00000001";
     }
@@ -463,6 +473,80 @@ BOOST_AUTO_TEST_CASE(a_link_may_be_closed_or_finished_before_it_is_open) {
         }
         BOOST_TEST(!contains(client.socket.rest(), "busy"));
     }
+}
+
+// -- strangers -----------------------------------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(strangers_that_state_high_versions_keep_out_no_newer_member) {
+    node_with_tls car1{"car1", authority.share()};
+    node_with_tls stranger{"spy", authority.share()};
+    listen(car1);
+    const std::string claim = "PUSH self:cles/hello reply=no {\"version\":4000000000,\"epoch\":\"00000001\"}\n";
+    std::vector<std::unique_ptr<played_client>> strangers;
+    for (int i = 0; i < 16; ++i) {
+        auto& each = *strangers.emplace_back(std::make_unique<played_client>(*this, stranger));
+        each.shake_hands();
+        each.say(claim + "PUSH self:cles/roster reply=no " + std::string(20'000, 'x'));
+        each.wait_for("cles/hello");
+    }
+    authority.add(node("car3"));
+    node_with_tls car3{"car3", authority.share()};
+    end near;
+    BOOST_TEST(!dial(car3, near, "car1"));
+    BOOST_TEST(car1.of->in_force().version() == authority.newest().version());
+}
+
+BOOST_AUTO_TEST_CASE(a_long_roster_from_another_address_ends_the_oldest_of_those_with_most) {
+    node_with_tls car1{"car1", authority.share(), 60s};
+    node_with_tls stranger{"spy", authority.share()};
+    listen(car1);
+    // 16 of them have space.
+    const std::string part = "PUSH self:cles/hello reply=no {\"version\":4000000000,\"epoch\":\"00000001\"}\n"
+                             "PUSH self:cles/roster reply=no " +
+                             std::string(999'000, 'x');
+    std::vector<std::unique_ptr<played_client>> strangers;
+    for (int i = 0; i < 17; ++i) {
+        auto& each = *strangers.emplace_back(std::make_unique<played_client>(*this, stranger));
+        each.shake_hands();
+        each.say(part);
+        run_ready(io); // until all of it has been read
+    }
+    strangers.back()->wait_for("too many rosters"); // all are of one address
+    played_client other{*this, stranger, socket_from("127.0.0.2")};
+    other.shake_hands();
+    other.say(part);
+    strangers.front()->wait_for("too many rosters");
+    run_until(io, [&] { return accepted.at(0)->events->lost(); });
+    BOOST_TEST(accepted[0]->events->why == make_error_code(tls_errc::busy));
+    BOOST_TEST(!accepted[1]->events->lost());
+    BOOST_TEST(!accepted.back()->events->lost());
+}
+
+BOOST_AUTO_TEST_CASE(an_address_that_begins_many_handshakes_is_refused_and_others_are_not) {
+    // So few that even a slow machine uses them up.
+    node_with_tls car1{"car1",
+                       authority.share(),
+                       5s,
+                       {.share = {.per_second = 1, .at_once = 2},
+                        .shares = {.per_second = 1, .at_once = 8},
+                        .common = {.per_second = 1, .at_once = 4}}};
+    node_with_tls car2{"car2", authority.share()};
+    listen(car1);
+    const auto busy = make_error_code(tls_errc::busy);
+    int begun = 0;
+    do {
+        auto client = socket();
+        const auto number = accepted.size();
+        client.send("GET / HTTP/1.1\r\n\r\n");
+        client.close();
+        run_until(io, [&] { return accepted.size() > number && accepted[number]->events->lost(); });
+        ++begun;
+    } while (accepted.back()->events->why != busy && begun < 30);
+    BOOST_TEST(accepted.back()->events->why == busy);
+    BOOST_TEST(begun > 6);
+    played_client other{*this, car2, socket_from("127.0.0.2")};
+    other.open();
+    BOOST_TEST(!accepted.back()->events->lost());
 }
 
 // -- many ----------------------------------------------------------------------------------------------------------

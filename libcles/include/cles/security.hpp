@@ -32,7 +32,7 @@ struct security_options {
 ///
 /// ```
 /// cles::service car{io, {.name = "car1", .listen = {"tls://0.0.0.0:25370"}, .security =
-/// cles::secured("/etc/cles/keys")}};
+/// cles::secured("/var/lib/cles/keys")}};
 /// ```
 ///
 /// The service's name must be the one of the key. It listens and connects by `tls`, by `udp` with sealed datagrams, and

@@ -95,6 +95,8 @@ class node_security {
 
     /// Datagrams that were dropped because they were not sealed.
     [[nodiscard]] virtual std::uint64_t unsealed_datagrams() const { return 0; }
+    /// Sealed datagrams of the group that could not be opened.
+    [[nodiscard]] virtual std::uint64_t unopened_group_datagrams() const { return 0; }
 
     /// The version of the roster in force.
     [[nodiscard]] virtual std::uint32_t roster_version() const = 0;

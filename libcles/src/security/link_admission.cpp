@@ -4,6 +4,7 @@
 #include <cles/json_reader.hpp>
 #include <cles/printable.hpp>
 
+#include "port/ip_network.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 #include "security/fleet/roster.hpp"
@@ -17,6 +18,7 @@ namespace {
 constexpr std::size_t max_short_line = 1024; // any but the roster's
 constexpr std::size_t max_quoted = 200;      // of what the other end says
 constexpr std::string_view roster_head = "PUSH self:cles/roster reply=no ";
+constexpr const char* too_many_rosters = "too many rosters arrive at the same time";
 
 struct hello {
     std::uint32_t version = 0;
@@ -67,10 +69,19 @@ std::string quoted_message(std::string_view body) {
 
 } // namespace
 
-link_admission::link_admission(std::shared_ptr<admission_terms> terms, std::string expected)
-    : terms_(std::move(terms)), expected_(std::move(expected)) {}
+link_admission::link_admission(std::shared_ptr<admission_terms> terms, std::string expected, std::string_view host)
+    : terms_(std::move(terms)), expected_(std::move(expected)), source_(core::share_of_address(host)) {}
 
-link_admission::~link_admission() { release_roster(); }
+link_admission::~link_admission() = default;
+
+bool link_admission::take_handshake(time_point now) {
+    handshake_ = terms_->handshakes.take(source_, now);
+    if (handshake_ == admission_terms::handshake_turns::turn::refused) {
+        refuse(reason::busy, "too many links are being opened");
+        return false;
+    }
+    return true;
+}
 
 void link_admission::begin(const public_key& peer, std::string& out) {
     key_ = peer;
@@ -114,14 +125,6 @@ link_admission::verdict link_admission::on_hello(std::string_view body, std::str
     }
     epoch_ = said->epoch;
     if (said->version > stated_) {
-        if (find_peer() == nullptr) {
-            if (terms_->rosters_of_strangers >= admission_terms::max_rosters_of_strangers) {
-                append_refusal(out, errc::busy, "too many rosters arrive at the same time");
-                return refuse(reason::busy, "too many rosters arrive at the same time");
-            }
-            ++terms_->rosters_of_strangers;
-            counted_ = true;
-        }
         stage_ = stage::roster;
         return verdict::pending;
     }
@@ -131,8 +134,44 @@ link_admission::verdict link_admission::on_hello(std::string_view body, std::str
     return look_up(out);
 }
 
+// A stated version uses up nothing, since anybody can state any. Only what arrives of a long roster counts.
+link_admission::verdict link_admission::on_part(std::size_t size, std::string& out) {
+    if (stage_ != stage::roster || size <= admission_terms::short_roster || find_peer() != nullptr ||
+        make_space_for_roster(size)) {
+        return verdict::pending;
+    }
+    append_refusal(out, errc::busy, too_many_rosters);
+    return refuse(reason::busy, too_many_rosters);
+}
+
+bool link_admission::make_space_for_roster(std::size_t size) {
+    auto& places = terms_->rosters_of_strangers;
+    const std::size_t own_others = places.held_by(source_) - (roster_place_.is_held() ? 1 : 0);
+    while (places.amount() - roster_place_.amount() + size > admission_terms::long_rosters) {
+        auto* const other = places.first_to_yield();
+        if (other == nullptr || other->source_ == source_ || places.held_by(other->source_) <= own_others) {
+            return false;
+        }
+        other->displace();
+    }
+    if (!roster_place_.is_held()) {
+        roster_place_ = places.take(source_, *this);
+    }
+    roster_place_.set_amount(size);
+    return true;
+}
+
+void link_admission::displace() {
+    refuse(reason::busy, too_many_rosters);
+    if (displaced_) {
+        std::string line;
+        append_refusal(line, errc::busy, too_many_rosters);
+        displaced_(line);
+    }
+}
+
 link_admission::verdict link_admission::on_roster(std::string_view body, std::string& out) {
-    release_roster();
+    roster_place_.release();
     std::string why;
     if (terms_->fleet->offer(body, &why) == fleet::verdict::refused) {
         append_refusal(out, errc::denied, "the roster was refused: " + why);
@@ -170,11 +209,12 @@ link_admission::verdict link_admission::on_welcome() {
         return refuse(reason::not_member, "a member was removed while the link was opened");
     }
     stage_ = stage::done;
+    terms_->handshakes.give_back(source_, handshake_);
     return verdict::admitted;
 }
 
 link_admission::verdict link_admission::refuse(reason r, std::string why) {
-    release_roster();
+    roster_place_.release();
     stage_ = stage::done;
     reason_ = r;
     why_ = std::move(why);
@@ -188,12 +228,6 @@ bool link_admission::is_in_force() const {
     const auto* self = terms_->fleet->self();
     return peer != nullptr && peer->number == number_ && peer->name == name_ &&
            (!own_number_ || (self != nullptr && self->number == *own_number_));
-}
-
-void link_admission::release_roster() noexcept {
-    if (std::exchange(counted_, false)) {
-        --terms_->rosters_of_strangers;
-    }
 }
 
 } // namespace cles::security

@@ -10,9 +10,23 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <string>
 #include <utility>
 
 namespace cles::security {
+namespace {
+
+std::string host_text(const datagram_path& at) {
+    core::ip_address address{.is_v6 = !at.is_v4(), .bytes = at.v6_address()};
+    if (at.is_v4()) { // the last bytes of ::ffff:10.0.0.1
+        std::rotate(address.bytes.begin(), address.bytes.end() - 4, address.bytes.end());
+        std::fill(address.bytes.begin() + 4, address.bytes.end(), std::uint8_t{0});
+    }
+    return core::to_text(address);
+}
+
+} // namespace
 
 secured_node::secured_node(const std::string& directory) : directory_(directory), files_(file_state()) {
     auto found = directory_.read_node();
@@ -46,6 +60,29 @@ void secured_node::log_refusal(std::string_view kind, std::string_view source, s
     }
 }
 
+// Anybody can send one in the name of any member, from any address.
+void secured_node::log_refused_hello(const datagram_source& by, hello_refusal why) {
+    const auto* const member = fleet_->in_force().find(by.member);
+    const auto whose = member == nullptr ? "number " + std::to_string(by.member) : member->name;
+    const auto in_roster = "in version " + std::to_string(roster_version()) + " of the roster";
+    std::string_view kind = "hello.busy";
+    auto text = "a HELLO of " + whose + " by UDP was refused: ";
+    switch (why) {
+    case hello_refusal::not_member:
+        kind = "hello.not_member";
+        text += "that is no member " + in_roster;
+        break;
+    case hello_refusal::unproven:
+        kind = "hello.unproven";
+        text += "it was not made with the key that it has " + in_roster + ", or for another node";
+        break;
+    case hello_refusal::busy: text += "too many arrive"; break;
+    case hello_refusal::none: return;
+    }
+    const auto host = host_text(by.path);
+    log_refusal(kind, host, text, text + " (" + host + ")");
+}
+
 // -- its node ------------------------------------------------------------------------------------------------------
 
 void secured_node::begin(std::string_view name, std::uint32_t epoch, const core::clock& time,
@@ -56,21 +93,23 @@ void secured_node::begin(std::string_view name, std::uint32_t epoch, const core:
     }
     observer_ = &observer;
     time_ = &time;
-    datagrams_->begin(epoch, time,
-                      {.due =
-                           [this](time_point at) {
-                               next_datagrams_ = at;
-                               if (observer_ != nullptr) {
-                                   observer_->on_due(at);
-                               }
-                           },
-                       .stated =
-                           [this](std::uint32_t number, std::uint32_t version) {
-                               const auto* const who = fleet_->in_force().find(number);
-                               if (who != nullptr && observer_ != nullptr) {
-                                   observer_->on_stated_roster(who->name, version);
-                               }
-                           }});
+    datagrams_->begin(
+        epoch, time,
+        {.due =
+             [this](time_point at) {
+                 next_datagrams_ = at;
+                 if (observer_ != nullptr) {
+                     observer_->on_due(at);
+                 }
+             },
+         .stated =
+             [this](std::uint32_t number, std::uint32_t version) {
+                 const auto* const who = fleet_->in_force().find(number);
+                 if (who != nullptr && observer_ != nullptr) {
+                     observer_->on_stated_roster(who->name, version);
+                 }
+             },
+         .refused = [this](const datagram_source& by, hello_refusal why) { log_refused_hello(by, why); }});
     for (auto& each : std::exchange(warnings_, {})) {
         log(log_level::warning, std::move(each));
     }

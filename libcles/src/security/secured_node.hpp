@@ -65,6 +65,7 @@ class secured_node : public core::node_security {
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override;
     [[nodiscard]] std::unique_ptr<core::message_seal> seal_messages() override;
     [[nodiscard]] std::uint64_t unsealed_datagrams() const override { return datagrams_->unsealed(); }
+    [[nodiscard]] std::uint64_t unopened_group_datagrams() const override { return datagrams_->group_unopened(); }
     [[nodiscard]] std::uint32_t roster_version() const override { return fleet_->in_force().version(); }
     [[nodiscard]] const std::string& roster_line() const override { return fleet_->in_force().line(); }
     std::optional<std::string> offer_roster(std::string_view line) override;
@@ -78,6 +79,7 @@ class secured_node : public core::node_security {
     };
 
     void log_refusal(std::string_view kind, std::string_view source, std::string_view why, std::string text);
+    void log_refused_hello(const datagram_source& by, hello_refusal why);
     void on_roster();
     void adopt_changes();
     void store();

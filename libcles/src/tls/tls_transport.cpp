@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "tls/tls_transport.hpp"
 
+#include <cles/boottime_clock.hpp>
+
 #include "protocol/line.hpp"
 #include "security/link_admission.hpp"
 #include "tls/tls_context.hpp"
@@ -41,11 +43,12 @@ tls_errc code_of(admission::reason why) noexcept {
 /// What all links of a node share.
 struct shared_terms {
     explicit shared_terms(tls_options options)
-        : context(options.fleet->own_key()), admission(std::make_shared<security::admission_terms>()),
-          report(std::move(options.report)), time_to_open(options.time_to_open) {
-        admission->fleet = std::move(options.fleet);
-        admission->epoch = std::move(options.epoch);
-    }
+        : context(options.fleet->own_key()),
+          admission(std::make_shared<security::admission_terms>(
+              security::admission_terms{.fleet = std::move(options.fleet),
+                                        .epoch = std::move(options.epoch),
+                                        .handshakes = security::admission_terms::handshake_turns{options.handshakes}})),
+          report(std::move(options.report)), time_to_open(options.time_to_open) {}
 
     tls_context context;
     std::shared_ptr<security::admission_terms> admission;
@@ -58,12 +61,22 @@ class tls_codec final : public transport::stream_codec {
   public:
     tls_codec(std::shared_ptr<const shared_terms> shared, tls_engine::role as, std::string expected,
               std::string address)
-        : shared_(std::move(shared)), engine_(shared_->context, as),
-          admission_(shared_->admission, std::move(expected)), address_(std::move(address)) {}
+        : shared_(std::move(shared)), engine_(shared_->context, as), address_(std::move(address)),
+          admission_(shared_->admission, std::move(expected), host()), awaits_turn_(as == tls_engine::role::server) {}
 
     std::span<char> prepare() override { return engine_.prepare(); }
-    void commit(std::size_t count) override { engine_.commit(count); }
+    void commit(std::size_t count) override {
+        engine_.commit(count);
+        received_ = received_ || count != 0; // at the end of the stream, it is 0
+    }
     status open(error_code& why) override {
+        if (displaced_) {
+            why = tls_errc::busy;
+            return status::failed;
+        }
+        if (received_ && std::exchange(awaits_turn_, false) && !admission_.take_handshake(boottime_clock::now())) {
+            return fail(why);
+        }
         if (lines_) {
             return admit(why);
         }
@@ -85,11 +98,12 @@ class tls_codec final : public transport::stream_codec {
     void describe(identity& peer) const override { peer.name = admission_.name(); }
     [[nodiscard]] std::string_view epoch() const noexcept override { return admission_.epoch(); }
     void watch(std::function<void(error_code)> broken) override {
-        observation_ = shared_->admission->fleet->observe([this, broken = std::move(broken)](const security::roster&) {
-            if (!removed_ && !admission_.is_in_force()) {
-                removed_ = true;
-                broken(tls_errc::removed);
-            }
+        broken_ = std::move(broken);
+        admission_.on_displaced([this](std::string_view line) {
+            displaced_ = true;
+            write_last(line);
+            report();
+            broken_(tls_errc::busy);
         });
     }
     status decode(std::span<char> space, std::size_t& count, error_code& why) override {
@@ -112,7 +126,10 @@ class tls_codec final : public transport::stream_codec {
             engine_.write(text, why);
         }
     }
-    void finish() override { engine_.finish(); }
+    void finish() override {
+        admission_.give_up();
+        engine_.finish();
+    }
     [[nodiscard]] std::string& encoded() noexcept override { return engine_.encrypted(); }
     [[nodiscard]] std::size_t buffered() const noexcept override {
         return engine_.buffered() + (lines_ ? lines_->capacity() : 0);
@@ -133,6 +150,11 @@ class tls_codec final : public transport::stream_codec {
             case protocol::line_buffer::status::overlong: why = tls_errc::bad_admission; return status::failed;
             case protocol::line_buffer::status::need_more: break;
             }
+            std::string refusal;
+            if (admission_.on_part(lines_->unfinished().size(), refusal) == admission::verdict::refused) {
+                write_last(refusal);
+                return fail(why);
+            }
             std::size_t count = 0;
             switch (engine_.read(lines_->prepare(), count, why)) {
             case status::done: lines_->commit(count); break;
@@ -152,22 +174,48 @@ class tls_codec final : public transport::stream_codec {
         case admission::verdict::admitted:
             rest_ = lines_->unfinished();
             lines_.reset();
+            observe_roster();
             return status::done;
         case admission::verdict::refused: break;
         }
+        return fail(why);
+    }
+    /// What explains a refusal to the other end. If it cannot be written, the link ends all the same.
+    void write_last(std::string_view text) {
+        error_code unsent;
+        engine_.write(text, unsent);
+    }
+    status fail(error_code& why) {
         why = code_of(admission_.refused_for());
-        if (shared_->report) {
-            const auto host = address_.empty() ? std::string{} : parse_url(address_).host;
-            const auto key = security::to_base64url(admission_.key());
-            shared_->report({.kind = admission_.refused_for(), .source = host, .why = admission_.why(), .key = key});
-        }
+        report();
         return status::failed;
+    }
+    void report() const {
+        if (shared_->report) {
+            const auto from = host();
+            const bool is_known = admission_.key() != security::public_key{};
+            const auto key = is_known ? security::to_base64url(admission_.key()) : std::string{};
+            shared_->report({.kind = admission_.refused_for(), .source = from, .why = admission_.why(), .key = key});
+        }
+    }
+    [[nodiscard]] std::string host() const { return address_.empty() ? std::string{} : parse_url(address_).host; }
+    void observe_roster() {
+        observation_ = shared_->admission->fleet->observe([this](const security::roster&) {
+            if (!removed_ && !admission_.is_in_force()) {
+                removed_ = true;
+                broken_(tls_errc::removed);
+            }
+        });
     }
 
     std::shared_ptr<const shared_terms> shared_;
     tls_engine engine_;
+    std::string address_; // of the other end; empty: it is gone already
     admission admission_;
-    std::string address_;                        // of the other end; empty: it is gone already
+    bool awaits_turn_; // for the handshake
+    bool received_ = false;
+    bool displaced_ = false;
+    std::function<void(error_code)> broken_;
     std::optional<protocol::line_buffer> lines_; // of the admission, once the handshake is done
     std::string rest_;                           // what followed them
     std::shared_ptr<void> observation_;          // of the roster

@@ -4,6 +4,7 @@
 #include <cles/link.hpp>
 
 #include "security/fleet/fleet.hpp"
+#include "security/link_admission.hpp"
 #include "security/refused_link.hpp"
 
 #include <chrono>
@@ -21,6 +22,8 @@ struct tls_options {
     std::function<void(const security::refused_link&)> report{};
     /// For the handshake and the admission.
     std::chrono::milliseconds time_to_open = std::chrono::seconds{5};
+    /// How many handshakes with those that open links may be begun.
+    security::admission_terms::handshake_turns::bounds handshakes = security::admission_terms::usual_handshakes;
 };
 
 /// `tls://host:port` for one node (docs/security.md, "Streams"). The peer of a link is the member that its key belongs

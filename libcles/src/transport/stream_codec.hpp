@@ -48,8 +48,8 @@ class stream_codec {
     virtual void describe(identity& peer) const = 0;
     /// After it has opened: the epoch that the peer has stated; empty if it states none.
     [[nodiscard]] virtual std::string_view epoch() const noexcept = 0;
-    /// After it has opened: `broken` is called, later than the call that caused it, when the peer loses the right to
-    /// use the stream. From then on, nothing is decoded or encoded.
+    /// Before it opens: `broken` is called when something else than the stream's bytes ends it, such as the peer's loss
+    /// of the right to use it. From then on, nothing is decoded or encoded.
     virtual void watch(std::function<void(boost::system::error_code)> broken) = 0;
 
     /// Decodes at most `space.size()` bytes; `count` is set with `done`, and `why` with `failed`.

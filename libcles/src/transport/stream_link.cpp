@@ -49,6 +49,11 @@ void stream_link::start(std::shared_ptr<link_events> owner) {
 
 void stream_link::open(std::function<void(error_code)> opened) {
     opened_ = std::move(opened);
+    codec_->watch([weak = weak_from_this()](error_code why) {
+        if (const auto self = weak.lock()) {
+            post_call<&stream_link::fail>(self->socket_.get_executor(), self, why);
+        }
+    });
     timeout_.expires_after(codec_->time_to_open());
     wait_call<&stream_link::on_opening_timeout>(timeout_, shared_from_this());
     post_call<&stream_link::continue_opening>(socket_.get_executor(), shared_from_this());
@@ -89,11 +94,6 @@ void stream_link::on_opened() {
     opening_ = false;
     timeout_.cancel();
     codec_->describe(peer_);
-    codec_->watch([weak = weak_from_this()](error_code why) {
-        if (const auto self = weak.lock()) {
-            post_call<&stream_link::fail>(self->socket_.get_executor(), self, why);
-        }
-    });
     flush();
     if (owner_) {
         continue_later();

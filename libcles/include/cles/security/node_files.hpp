@@ -43,6 +43,11 @@ created_key create_node_key(const std::string& directory, const std::string& nam
 
 [[nodiscard]] node_description describe_node(const std::string& directory);
 
+/// Writes the node's private key and a certificate of it as PEM, for programs that use TLS without this library: the
+/// file `tls.pem` in the directory, which only its owner can read. An existing one is replaced.
+/// \return the path of the file
+std::string write_certificate(const std::string& directory);
+
 /// Stores a roster that contains this node, such as the content of NAME.join.
 node_description join_fleet(const std::string& directory, std::string_view roster_line);
 

@@ -101,6 +101,7 @@ struct counters {
     std::uint64_t leases_expired = 0;
     std::uint64_t datagrams_withheld = 0; ///< to unverified addresses, beyond their share
     std::uint64_t datagrams_unsealed = 0; ///< dropped with security; filled in when they are shown
+    std::uint64_t group_unopened = 0;     ///< sealed for others than this node; filled in when they are shown
     std::uint64_t group_received = 0;     ///< datagrams of the multicast group, other than its own
     std::uint64_t group_dropped = 0;      ///< of these: neither BIND nor update, or malformed, or beyond a limit
     std::uint64_t group_repeated = 0;     ///< copies, from nodes that send on several interfaces
@@ -127,8 +128,8 @@ BOOST_DESCRIBE_STRUCT(counters, (),
                        announcements_dropped, announcements_foreign, peers_known, peers_refused, tables_asked,
                        tables_failed, tables_told, entries_dropped, grants_sent, grants_received, granted_jobs_refused,
                        jobs_moved_in, jobs_moved_out, leases_expired, datagrams_withheld, datagrams_unsealed,
-                       group_received, group_dropped, group_repeated, group_copied, group_sent, group_unsent,
-                       group_failed, group_leases, links_open, links_accepted, links_refused, links_evicted,
-                       links_lost, bytes_received, bytes_sent))
+                       group_received, group_dropped, group_repeated, group_copied, group_unopened, group_sent,
+                       group_unsent, group_failed, group_leases, links_open, links_accepted, links_refused,
+                       links_evicted, links_lost, bytes_received, bytes_sent))
 
 } // namespace cles::core

@@ -66,14 +66,7 @@ bool link_admission::ensure_capacity(std::string_view address, time_point now) {
     if (links_.size() < bounds_.links) {
         return true;
     }
-    const auto usual = search(now);
-    auto* chosen = usual.first;
-    if (chosen == nullptr) {
-        chosen = link_of_largest_holder(address);
-    }
-    if (chosen == nullptr) {
-        chosen = usual.idle;
-    }
+    auto* const chosen = choose(address, now);
     if (chosen == nullptr) {
         return false;
     }
@@ -81,14 +74,35 @@ bool link_admission::ensure_capacity(std::string_view address, time_point now) {
     return links_.size() < bounds_.links;
 }
 
+link_monitor* link_admission::choose(std::string_view newcomer, time_point now) {
+    auto* const stranger = strangers_.first_to_yield();
+    if (stranger != nullptr && strangers_.held_by(stranger->address_) > strangers_.held_by(newcomer)) {
+        return stranger;
+    }
+    const auto usual = search(now);
+    if (usual.half_closed != nullptr) {
+        return usual.half_closed;
+    }
+    auto* const oldest = strangers_.oldest();
+    if (oldest != nullptr && now - oldest->opened_ >= first_line_grace) {
+        return oldest;
+    }
+    auto* const greedy = link_of_largest_holder(newcomer);
+    return greedy != nullptr ? greedy : usual.idle;
+}
+
 void link_admission::enter(link_monitor& m, std::string_view address) {
     m.address_ = address;
     m.place_ = links_.size();
     links_.push_back(&m);
     ++per_address_[m.address_];
+    if (!m.has_received_) {
+        m.stranger_ = strangers_.take(address, m);
+    }
 }
 
 void link_admission::leave(link_monitor& m) {
+    m.stranger_.release();
     auto* last = links_.back();
     links_[m.place_] = last;
     last->place_ = m.place_;
@@ -102,20 +116,15 @@ link_admission::candidates link_admission::search(time_point now) {
     if (now < search_again_) {
         return {};
     }
-    auto* first = earliest(links_, [](const link_monitor& m) { return m.half_closed_at_; });
-    if (first == nullptr) {
-        first = earliest(links_, [now](const link_monitor& m) {
-            return !m.has_received_ && now - m.opened_ >= first_line_grace ? std::optional{m.opened_} : std::nullopt;
-        });
-    }
+    auto* const half_closed = earliest(links_, [](const link_monitor& m) { return m.half_closed_at_; });
     auto* idle = earliest(links_, [now](const link_monitor& m) {
         return m.has_received_ && now - m.last_line_ >= idle_for && m.owner_.is_idle() ? std::optional{m.last_line_}
                                                                                        : std::nullopt;
     });
-    if (first == nullptr && idle == nullptr) {
+    if (half_closed == nullptr && idle == nullptr) {
         search_again_ = now + search_pause;
     }
-    return {first, idle};
+    return {half_closed, idle};
 }
 
 link_monitor* link_admission::link_of_largest_holder(std::string_view newcomer) const {

@@ -5,6 +5,7 @@
 
 #include "node/base/deadlines.hpp"
 #include "node/base/string_map.hpp"
+#include "port/stranger_places.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -59,6 +60,7 @@ class link_monitor final : private deadline {
         last_line_ = now;
         if (!has_received_ && !is_source_) {
             deadlines_.disarm(*this);
+            stranger_.release();
         }
         has_received_ = true;
     }
@@ -85,20 +87,22 @@ class link_monitor final : private deadline {
     std::optional<time_point> half_closed_at_;
     bool has_received_ = false;
     bool is_source_ = false;
-    std::string address_;   // of `link_admission`
-    std::size_t place_ = 0; // likewise
+    std::string address_;                           // of `link_admission`
+    std::size_t place_ = 0;                         // likewise
+    stranger_places<link_monitor>::place stranger_; // likewise, until the first line
 };
 
 /// Decides which accepted links a node keeps when their number has reached the limit (docs/protocol.md, "Closing a
 /// link").
 ///
-/// Peers that do not use their links must not lock out new ones. To admit a new link, the node closes the first
-/// that exists of
-///  1. the link that has been half-closed for longest;
-///  2. the oldest link that has received no line within `first_line_grace`;
-///  3. if one address holds more than its share and the new link comes from another: of that address's links, the one
+/// Peers that do not use their links must not lock out new ones, and strangers with many addresses must not either. To
+/// admit a new link, the node closes the first that exists of
+///  1. of the address with the most links without a line, the oldest of these, if the new link's address has fewer;
+///  2. the link that has been half-closed for longest;
+///  3. the oldest without a line, whatever its address, if it has received none within `first_line_grace`;
+///  4. if one address holds more than its share and the new link comes from another: of that address's links, the one
 ///     that has been idle for longest or, if none is idle, the newest;
-///  4. the link that has been idle for longest, and for at least `idle_for`.
+///  5. the link that has been idle for longest, and for at least `idle_for`.
 /// If there is none, the new link is refused.
 class link_admission {
   public:
@@ -118,15 +122,17 @@ class link_admission {
 
   private:
     struct candidates {
-        link_monitor* first = nullptr; ///< half-closed, or without a line
+        link_monitor* half_closed = nullptr;
         link_monitor* idle = nullptr;
     };
     candidates search(time_point now);
+    [[nodiscard]] link_monitor* choose(std::string_view newcomer, time_point now);
     [[nodiscard]] link_monitor* link_of_largest_holder(std::string_view newcomer) const;
 
     const limits& bounds_;
     std::vector<link_monitor*> links_;
     string_map<std::size_t> per_address_;
+    stranger_places<link_monitor> strangers_; // links without a line
     time_point search_again_{};
 };
 

@@ -6,6 +6,7 @@
 
 #include "node/membership/reachable_endpoints.hpp"
 #include "port/node_security.hpp"
+#include "protocol/exempt_nouns.hpp"
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
@@ -127,12 +128,7 @@ protocol::failure reason_of(const node_state& n, passage why, std::string_view r
 }
 
 bool is_exempt(const protocol::noun_view& noun) noexcept {
-    if (noun.task != "cles" || noun.parameters.empty()) {
-        return false;
-    }
-    const auto what = noun.parameters.front();
-    return what == "cancel" || what == "roster" || what == "hello" || what == "announced" || what == "leaving" ||
-           what == "slots";
+    return !noun.parameters.empty() && protocol::is_exempt_from_rights(noun.task, noun.parameters.front());
 }
 
 // For `any` and `all`, the rights are checked for each node that is asked.

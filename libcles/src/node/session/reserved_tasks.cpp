@@ -168,6 +168,7 @@ void write_metrics(json_writer& w, const node_state& n, shown_counters shown) {
     auto counts = n.counts;
     counts.peers_known = n.peers.size();
     counts.datagrams_unsealed = n.security ? n.security->unsealed_datagrams() : 0;
+    counts.group_unopened = n.security ? n.security->unopened_group_datagrams() : 0;
     w.begin_object();
     write_member(w, "uptime_ms", milliseconds_since(n.started, n.time.now()));
     w.key("requests");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/access/access_policy.hpp"
 
+#include "protocol/exempt_nouns.hpp"
 #include "security/access/wildcard.hpp"
 
 #include <algorithm>
@@ -11,11 +12,9 @@ namespace {
 
 using cause = access_decision::cause;
 
-// Cancelling, learning the roster, and confirming an epoch.
 bool is_exempt(const decoded_noun& noun) noexcept {
     const auto parameters = noun.parameters();
-    return noun.task() == "cles" && !parameters.empty() &&
-           (parameters[0] == "cancel" || parameters[0] == "roster" || parameters[0] == "announced");
+    return !parameters.empty() && protocol::is_exempt_from_rights(noun.task(), parameters.front());
 }
 
 bool may_forward_for(std::span<const std::string_view> patterns, std::string_view name) noexcept {

@@ -78,7 +78,7 @@ std::optional<datagram_head> read_head(bytes_view datagram) noexcept {
     switch (head.kind) {
     case datagram_kind::hello:
     case datagram_kind::welcome:
-        if (size != hello_bytes) {
+        if (size != hello_bytes && (head.kind != datagram_kind::hello || size != hello_with_mac_bytes)) {
             return {};
         }
         head.index = load_big<8>(at + 4);

@@ -24,11 +24,14 @@ constexpr std::size_t group_head_bytes = 32;
 constexpr std::size_t group_nonce_at = 8; ///< salt and counter are the nonce
 constexpr std::size_t statement_bytes = 40;
 constexpr std::size_t hello_bytes = hello_head_bytes + 32 + statement_bytes + seal_bytes; ///< WELCOME is as long
+constexpr std::size_t mac_bytes = 16;
+constexpr std::size_t hello_with_mac_bytes = hello_bytes + mac_bytes; ///< of HELLO with a MAC
 constexpr std::size_t max_data = data_head_bytes + max_line + seal_bytes;
 constexpr std::size_t max_sealed = group_head_bytes + max_line + seal_bytes;
 
 using group_salt = std::array<std::uint8_t, 16>;
 using hello_datagram = std::array<std::uint8_t, hello_bytes>;
+using hello_mac = std::array<std::uint8_t, mac_bytes>;
 
 /// Whether a datagram is sealed: all others are lines.
 [[nodiscard]] constexpr bool is_sealed(bytes_view datagram) noexcept {

@@ -5,6 +5,7 @@
 
 #include <boost/unordered/unordered_flat_map.hpp>
 
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -27,7 +28,7 @@ using session_table = boost::unordered_flat_map<std::uint64_t, session_in_use>;
 /// A handshake that this node has begun.
 struct hello_attempt {
     noise_initiator handshake;
-    hello_datagram hello;
+    std::array<std::uint8_t, hello_with_mac_bytes> hello; // with its MAC
     std::uint64_t index;
     std::uint64_t order;
     time_point begun;

@@ -14,7 +14,8 @@ using introduction = datagram_peer::introduction;
 datagram_sessions::datagram_sessions(fleet& of, datagram_sink& sink, entropy& random, datagram_limits limits)
     : fleet_(of), sink_(sink), random_(random), limits_(limits),
       observation_(of.observe([this](const roster& before) { on_roster(before); })),
-      welcomes_(limits.hellos_per_second), half_open_(of, random, limits.hellos_per_second) {}
+      welcomes_(member_bounds(limits.hellos_per_second, half_open_sessions::share_of_member)),
+      half_open_(of, random, limits.hellos_per_second) {}
 
 datagram_sessions::~datagram_sessions() = default;
 
@@ -43,6 +44,8 @@ void datagram_sessions::receive_hello(const datagram_path& from, const datagram_
     };
     if (const auto* const welcome = half_open_.receive(from, head, datagram, part, now)) {
         sink_.send(from, *welcome);
+    } else if (half_open_.refused_for() != hello_refusal::none) {
+        sink_.refused({.path = from, .member = head.sender}, half_open_.refused_for());
     }
 }
 
@@ -55,7 +58,8 @@ void datagram_sessions::receive_welcome(const datagram_path& from, const datagra
     auto& p = *found->second;
     std::array<std::uint8_t, statement_bytes> payload{};
     traffic_keys keys;
-    if (p.source() != datagram_source{.path = from, .member = head.sender} || !welcomes_.take(now) ||
+    if (p.source() != datagram_source{.path = from, .member = head.sender} ||
+        welcomes_.take(head.sender, now) == member_turns::turn::refused ||
         !p.trying->handshake.read(datagram.subspan(hello_head_bytes), payload, keys)) {
         return;
     }
@@ -230,13 +234,14 @@ bool datagram_sessions::begin(peer& p, time_point now) {
                                .peer = member.agreement},
                               std::move(ephemeral)};
     const auto index = new_index();
-    hello_datagram hello{};
+    std::array<std::uint8_t, hello_with_mac_bytes> hello{};
     write_hello_head(datagram_kind::hello, fleet_.self()->number, index, hello.data());
-    const std::span text{hello};
+    const auto text = std::span{hello}.first<hello_bytes>();
     if (!handshake.write(hello_prologue(roster.fleet(), member.number, text.first<hello_head_bytes>()),
                          write_statement(0, sink_.statement()), text.subspan(hello_head_bytes))) {
         return false;
     }
+    std::ranges::copy(half_open_.macs().make(member, text), hello.begin() + hello_bytes);
     p.trying = std::make_unique<hello_attempt>(hello_attempt{
         .handshake = std::move(handshake), .hello = hello, .index = index, .order = ++order_, .begun = now});
     attempts_[index] = &p;
@@ -245,6 +250,13 @@ bool datagram_sessions::begin(peer& p, time_point now) {
     arm(p);
     sink_.send(p.source().path, hello);
     return true;
+}
+
+// Nodes of earlier versions ignore HELLO with a MAC. Others open few without one, so that alone is not enough.
+void datagram_sessions::send_again(const peer& p) {
+    const bytes_view hello = p.trying->hello;
+    sink_.send(p.source().path, hello);
+    sink_.send(p.source().path, hello.first(hello_bytes));
 }
 
 void datagram_sessions::end_attempt(peer& p) {
@@ -402,7 +414,7 @@ void datagram_sessions::serve(peer& p, time_point now) {
                 p.drop(*session);
             }
         } else if (p.trying != nullptr) {
-            sink_.send(p.source().path, p.trying->hello);
+            send_again(p);
         } else {
             send_in(p, *p.unconfirmed(), {}, now);
         }

@@ -21,7 +21,7 @@
 namespace cles::security {
 
 struct datagram_limits {
-    std::uint32_t hellos_per_second = 500; ///< new ones that are opened, and as many WELCOME
+    std::uint32_t hellos_per_second = 500; ///< new ones of members that are opened, and as many WELCOME
     std::chrono::nanoseconds rekey_after = std::chrono::minutes{15};
     std::chrono::nanoseconds forget_after = std::chrono::minutes{20};
     std::uint64_t rekey_datagrams = std::uint64_t{1} << 48U;
@@ -53,6 +53,8 @@ class datagram_sink {
     /// A handshake was not answered, and lines that waited for it are dropped: try `tls`, which also exchanges rosters.
     /// \param lost there is no earlier session either
     virtual void gave_up(const datagram_source& with, bool lost) = 0;
+    /// A HELLO was not opened. Anybody can send one in the name of any member.
+    virtual void refused(const datagram_source&, hello_refusal) {}
     /// Whether to remember the epoch of a source without a session, so that a restart is reported: requests may have
     /// been sent to it, and may be sent again. What is asked for is to be released.
     [[nodiscard]] virtual bool holds(const datagram_source&) const { return false; }
@@ -116,6 +118,7 @@ class datagram_sessions {
     void erase(peer& p);
 
     bool begin(peer& p, time_point now);
+    void send_again(const peer& p);
     void end_attempt(peer& p);
     bool keep_waiting(peer& p, std::string_view line);
     void drop_waiting(peer& p);
@@ -136,7 +139,7 @@ class datagram_sessions {
     std::shared_ptr<void> observation_;
     fork_detector process_;
     std::uint64_t order_ = 0;
-    rate_limit welcomes_;
+    member_turns welcomes_; // anybody who sees a HELLO can forge its answer
     half_open_sessions half_open_;
     session_table sessions_;
     boost::unordered_flat_map<datagram_source, std::unique_ptr<peer>, datagram_source::hash> peers_;

@@ -12,12 +12,15 @@ namespace cles::security {
 namespace {
 
 constexpr std::chrono::seconds between_contacts{1};
-constexpr std::size_t max_newer = 16;
+constexpr std::size_t max_unverified = 16;
 
 } // namespace
 
 group_receiver::group_receiver(fleet& of, group_sender& own, entropy& random)
-    : fleet_(of), own_(own), random_(random), observation_(of.observe([this](const roster&) { newer_.clear(); })),
+    : fleet_(of), own_(own), random_(random), observation_(of.observe([this](const roster&) {
+          newer_.clear();
+          older_.clear();
+      })),
       salts_(of) {}
 
 void group_receiver::learn(std::uint32_t member, const node_statement& stated) {
@@ -28,15 +31,19 @@ group_receiver::result group_receiver::open(const datagram_path& from, bytes_vie
     const auto head = read_head(datagram);
     const auto* const self = fleet_.self();
     if (!head || head->kind != datagram_kind::group || self == nullptr ||
-        fleet_.in_force().find(head->sender) == nullptr) {
+        fleet_.in_force().find(head->sender) == nullptr ||
+        (head->sender == self->number && head->salt == own_.salt())) {
         return {};
     }
     const datagram_source source{.path = from, .member = head->sender};
     if (fleet_.ring().is_future(head->generation)) {
-        return {.contact = newer_roster(source, now)};
+        return {.contact = choose(newer_, source, now)};
+    }
+    if (head->generation < fleet_.in_force().oldest()) {
+        return {.outdated = choose(older_, source, now)};
     }
     const auto* const key = fleet_.ring().find(head->generation);
-    if (key == nullptr || (head->sender == self->number && head->salt == own_.salt()) ||
+    if (key == nullptr ||
         crypto_aead_xchacha20poly1305_ietf_decrypt(
             opened_.data(), nullptr, nullptr, datagram.data() + group_head_bytes, datagram.size() - group_head_bytes,
             datagram.data(), group_head_bytes, datagram.data() + group_nonce_at, key->data()) != 0) {
@@ -79,30 +86,41 @@ core::datagram_admission::repetition group_receiver::accept_announcement(const t
 }
 
 bool group_receiver::may_contact(const datagram_source& source, time_point now) {
-    while (!contacted_.empty() && now - contacted_.front().at >= between_contacts) {
-        contacted_.pop_front();
-    }
-    if (std::ranges::find(contacted_, source, &recent_contact::source) != contacted_.end() || !contacts_.take(now)) {
+    if (contacted_.contains(source, now) || contacts_.take(source.member, now) == member_turns::turn::refused) {
         return false;
     }
-    contacted_.push_back({.source = source, .at = now});
+    contacted_.add(source, now);
     return true;
 }
 
-// Nobody can tell whether such a datagram is authentic. A random one of the sources is asked, so that those who are not
-// members do not decide which.
-std::optional<datagram_source> group_receiver::newer_roster(const datagram_source& source, time_point now) {
-    if (std::ranges::find(newer_, source) == newer_.end()) {
-        if (newer_.size() < max_newer) {
-            newer_.push_back(source);
+// A random one, so that those who are not members do not decide which. Their numbers are not authentic either: who can
+// send from the address of another could state many, and have this node send HELLO there for each.
+std::optional<datagram_source> group_receiver::choose(unverified_sources& among, const datagram_source& latest,
+                                                      time_point now) {
+    if (!chosen_.contains(latest.path, now) && std::ranges::find(among, latest) == among.end()) {
+        if (among.size() < max_unverified) {
+            among.push_back(latest);
         } else {
-            newer_[random_.draw<std::uint32_t>() % newer_.size()] = source;
+            among[random_.draw<std::uint32_t>() % among.size()] = latest;
         }
     }
-    if (!roster_contacts_.take(now)) {
+    if (among.empty() || !choices_.take(now)) {
         return {};
     }
-    return newer_[random_.draw<std::uint32_t>() % newer_.size()];
+    const auto chosen = among[random_.draw<std::uint32_t>() % among.size()];
+    chosen_.add(chosen.path, now);
+    for (auto* const each : {&newer_, &older_}) {
+        std::erase_if(*each, [&](const datagram_source& other) { return other.path == chosen.path; });
+    }
+    return chosen;
+}
+
+template <class Source>
+bool group_receiver::recent<Source>::contains(const Source& which, time_point now) {
+    while (!all_.empty() && now - all_.front().at >= between_contacts) {
+        all_.pop_front();
+    }
+    return std::ranges::find(all_, which, &entry::which) != all_.end();
 }
 
 } // namespace cles::security

@@ -5,6 +5,7 @@
 #include "security/datagrams/datagram_format.hpp"
 #include "security/datagrams/datagram_path.hpp"
 #include "security/datagrams/entropy.hpp"
+#include "security/datagrams/handshake_turns.hpp"
 #include "security/datagrams/rate_limit.hpp"
 #include "security/datagrams/salt_table.hpp"
 #include "security/fleet/fleet.hpp"
@@ -52,6 +53,9 @@ class group_receiver {
         ticket accepted_by{};    ///< for `accept`, if it was opened
         /// The caller now sends HELLO there (`datagram_sessions::contact`), to learn of a salt or a newer roster.
         std::optional<datagram_source> contact{};
+        /// There may be a member whose roster is so old that its group keys are refused. The caller tells it where
+        /// this node is, which has a newer one.
+        std::optional<datagram_source> outdated{};
     };
     result open(const datagram_path& from, bytes_view datagram, time_point now);
 
@@ -65,23 +69,40 @@ class group_receiver {
     [[nodiscard]] core::datagram_admission::repetition accept_announcement(const ticket& t, std::uint64_t seq);
 
   private:
-    struct recent_contact {
-        datagram_source source;
-        time_point at;
+    /// Those of the last second.
+    template <class Source>
+    class recent {
+      public:
+        [[nodiscard]] bool contains(const Source& which, time_point now);
+        void add(const Source& which, time_point now) { all_.push_back({.which = which, .at = now}); }
+
+      private:
+        struct entry {
+            Source which;
+            time_point at;
+        };
+        std::deque<entry> all_; // oldest first
     };
 
+    /// Some sources of datagrams that cannot be opened because of their generation, so that nobody can tell whether
+    /// they are authentic.
+    using unverified_sources = std::vector<datagram_source>;
+
     [[nodiscard]] bool may_contact(const datagram_source& source, time_point now);
-    [[nodiscard]] std::optional<datagram_source> newer_roster(const datagram_source& source, time_point now);
+    [[nodiscard]] std::optional<datagram_source> choose(unverified_sources& among, const datagram_source& latest,
+                                                        time_point now);
 
     fleet& fleet_;
     group_sender& own_;
     entropy& random_;
     std::shared_ptr<void> observation_;
     salt_table salts_;
-    rate_limit contacts_{50};
-    std::deque<recent_contact> contacted_; // in this second
-    rate_limit roster_contacts_{10};
-    std::vector<datagram_source> newer_; // some sources of datagrams of later generations
+    member_turns contacts_{member_bounds(50, {.per_second = 2, .at_once = 2})}; // old datagrams can be repeated
+    recent<datagram_source> contacted_;
+    unverified_sources newer_; // of later generations
+    unverified_sources older_; // of earlier generations
+    rate_limit choices_{10};   // of both
+    recent<datagram_path> chosen_;
     std::array<std::uint8_t, max_line> opened_{};
 };
 

@@ -3,34 +3,36 @@
 
 #include <cles/limits.hpp>
 
+#include "port/shared_turns.hpp"
+
 #include <algorithm>
-#include <chrono>
 #include <cstdint>
 
 namespace cles::security {
 
-/// Permits at most a number of events in any second: a token bucket that holds a tenth of them.
+/// Permits at most a number of events in any second: a tenth of them at once.
 class rate_limit {
   public:
     /// \pre per_second is at least 2
     explicit rate_limit(std::uint32_t per_second) noexcept
-        : burst_(std::max<std::uint32_t>(per_second / 10, 1)),
-          interval_(std::chrono::nanoseconds{std::chrono::seconds{1}} / (per_second - burst_)) {}
+        : rate_{.per_second = per_second - at_once_of(per_second), .at_once = at_once_of(per_second)} {}
 
     /// Whether one more is permitted now; if so, it counts.
     [[nodiscard]] bool take(time_point now) noexcept {
-        const auto from = std::max(full_, now); // the bucket is full again at `full_`
-        if (from - now > interval_ * (burst_ - 1)) {
-            return false;
+        const bool may = turns_.has(rate_, now);
+        if (may) {
+            turns_.take(rate_, now);
         }
-        full_ = from + interval_;
-        return true;
+        return may;
     }
 
   private:
-    std::uint32_t burst_;
-    std::chrono::nanoseconds interval_;
-    time_point full_{};
+    static constexpr std::uint32_t at_once_of(std::uint32_t per_second) noexcept {
+        return std::max<std::uint32_t>(per_second / 10, 1);
+    }
+
+    core::turn_rate rate_;
+    core::turn_bucket turns_;
 };
 
 } // namespace cles::security

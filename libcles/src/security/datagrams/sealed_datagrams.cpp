@@ -4,9 +4,21 @@
 #include <utility>
 
 namespace cles::security {
+namespace {
+
+bool is_announcement(std::string_view line) {
+    constexpr std::string_view start = "UPDATE ";
+    if (!line.starts_with(start)) {
+        return false;
+    }
+    line.remove_prefix(start.size());
+    return line.substr(0, line.find(' ')).ends_with(":cles");
+}
+
+} // namespace
 
 sealed_datagrams::sealed_datagrams(fleet& of, entropy& random)
-    : fleet_(of), sender_(of, random), receiver_(of, sender_, random), sessions_(of, *this, random) {}
+    : fleet_(of), sender_(of, random), receiver_(of, sender_, random), sessions_(of, *this, random), rosters_(of) {}
 
 void sealed_datagrams::begin(std::uint32_t epoch, const core::clock& time, observer by) {
     epoch_ = epoch;
@@ -81,10 +93,15 @@ group_receiver::result sealed_datagrams::open_group(const datagram_path& from, b
     }
     auto found = receiver_.open(from, datagram, now());
     if (found.what == group_receiver::verdict::dropped && !is_own(datagram)) {
-        count_unsealed();
+        ++group_unopened_;
     }
     if (found.contact) {
         contact(*found.contact);
+    }
+    if (found.outdated) { // not always the source of this datagram
+        if (auto* const at = find(found.outdated->path.local)) {
+            at->on_outdated(*found.outdated);
+        }
     }
     return found;
 }
@@ -118,6 +135,7 @@ node_statement sealed_datagrams::statement() {
 
 void sealed_datagrams::established(const datagram_source& with, const node_statement& stated, bool) {
     receiver_.learn(with.member, stated);
+    rosters_.learn(with.member, stated.roster);
     if (observer_.stated) {
         observer_.stated(with.member, stated.roster);
     }
@@ -127,14 +145,26 @@ void sealed_datagrams::established(const datagram_source& with, const node_state
 }
 
 void sealed_datagrams::opened(const datagram_source& from, std::uint32_t epoch, std::string_view line) {
-    if (auto* const at = find(from.path.local)) {
+    auto* const at = find(from.path.local);
+    if (at == nullptr) {
+        return;
+    }
+    if (!is_announcement(line)) {
         at->on_opened(from, epoch, line);
+    } else if (rosters_.has(from.member)) { // else it says nothing: the group brings it
+        at->on_announcement(from, line);
     }
 }
 
 void sealed_datagrams::gave_up(const datagram_source& with, bool lost) {
     if (auto* const at = find(with.path.local)) {
         at->on_gave_up(with, lost);
+    }
+}
+
+void sealed_datagrams::refused(const datagram_source& by, hello_refusal why) {
+    if (observer_.refused) {
+        observer_.refused(by, why);
     }
 }
 

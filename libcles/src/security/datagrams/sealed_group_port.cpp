@@ -7,6 +7,7 @@
 #include "protocol/request_line.hpp"
 #include "security/keys/bytes.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace cles::security {
@@ -14,10 +15,25 @@ namespace {
 
 constexpr std::size_t max_unknown = 256; // members
 constexpr std::size_t max_endpoints = 16;
-constexpr std::size_t depth = 8; // of an announcement
+constexpr std::size_t max_outdated = 64; // members with an old roster, which are to be told
+constexpr std::size_t depth = 8;         // of an announcement
+
+// "tls://0.0.0.0:25370", which means all addresses of the announcing node, becomes the one that it sends from.
+std::string with_source(std::string_view endpoint, const core::group_source& from) {
+    constexpr std::string_view unspecified = "://0.0.0.0";
+    std::string out{endpoint};
+    const auto at = out.find(unspecified);
+    const auto end = at + unspecified.size();
+    if (at != std::string::npos && (end == out.size() || out[end] == ':' || out[end] == '?')) {
+        out.replace(out.find("0.0.0.0", at), std::string_view{"0.0.0.0"}.size(), core::host_text(from));
+    }
+    return out;
+}
+
+bool is_tls(std::string_view endpoint) { return endpoint.starts_with("tls:"); }
 
 // Of an announcement; empty for other lines.
-std::vector<std::string> endpoints_in(std::string_view line) {
+std::vector<std::string> endpoints_in(std::string_view line, const core::group_source& from) {
     std::vector<std::string> found;
     protocol::request_line said;
     if (!protocol::parse_group_message(line, said) || !said.is_update() || said.noun.path != "cles") {
@@ -27,7 +43,7 @@ std::vector<std::string> endpoints_in(std::string_view line) {
     core::read_members(r, [&](std::string_view key) {
         return key != "endpoints" ? r.skip() : core::read_texts(r, [&](std::string_view text) {
             if (found.size() < max_endpoints) {
-                found.emplace_back(text);
+                found.push_back(with_source(text, from));
             }
         });
     });
@@ -53,7 +69,9 @@ class group_admission final : public core::datagram_admission {
 
 sealed_group_port::sealed_group_port(std::shared_ptr<sealed_datagrams> by, std::shared_ptr<core::group_port> port,
                                      unanswered report)
-    : all_(std::move(by)), port_(std::move(port)), report_(std::move(report)), number_(all_->add(*this)) {}
+    : all_(std::move(by)), port_(std::move(port)), report_(std::move(report)), number_(all_->add(*this)),
+      announcement_start_("UPDATE " + all_->members().name() + ":cles "),
+      observation_(all_->observe([this](const roster&) { on_roster(); })) {}
 
 sealed_group_port::~sealed_group_port() { sealed_group_port::close(); }
 
@@ -78,6 +96,9 @@ core::datagrams_done sealed_group_port::send(core::datagram_list all) {
     for (auto rest = all; !rest.empty(); rest.drop_first()) {
         auto line = rest.first();
         line.remove_suffix(line.ends_with('\n') ? 1 : 0);
+        if (line.starts_with(announcement_start_)) {
+            announcement_ = line;
+        }
         const auto datagram = all_->seal_for_group(line);
         sealed_.append(as_text(datagram));
         sizes_.push_back(static_cast<std::uint16_t>(datagram.size()));
@@ -90,7 +111,7 @@ core::datagrams_done sealed_group_port::send(core::datagram_list all) {
         return lost;
     }
     const auto sent = port_->send({sealed_, sizes_});
-    core::datagrams_done done{.count = sent.count};
+    core::datagrams_done done{.count = sent.count, .failed = sent.failed, .why = sent.why};
     for (auto left = sent.count; left != 0; --left) {
         done.bytes += all.first().size();
         all.drop_first();
@@ -124,7 +145,7 @@ void sealed_group_port::on_datagram(const core::group_datagram& datagram) {
 void sealed_group_port::on_group(const core::group_datagram& datagram) {
     const auto found = all_->open_group(path_of(datagram.from), as_bytes(datagram.text));
     if (found.what == group_receiver::verdict::unknown_salt) {
-        note_unknown(read_head(as_bytes(datagram.text))->sender, found.line);
+        note_unknown(read_head(as_bytes(datagram.text))->sender, found.line, datagram.from);
         return;
     }
     const auto* const sender = found.what == group_receiver::verdict::opened
@@ -152,8 +173,8 @@ void sealed_group_port::on_group(const core::group_datagram& datagram) {
 
 // -- members with unknown salts ------------------------------------------------------------------------------------
 
-void sealed_group_port::note_unknown(std::uint32_t member, std::string_view line) {
-    if (auto endpoints = endpoints_in(line); !endpoints.empty() || unknown_.contains(member)) {
+void sealed_group_port::note_unknown(std::uint32_t member, std::string_view line, const core::group_source& from) {
+    if (auto endpoints = endpoints_in(line, from); !endpoints.empty() || unknown_.contains(member)) {
         if (unknown_.size() >= max_unknown && !unknown_.contains(member)) {
             unknown_.erase(unknown_.begin());
         }
@@ -173,9 +194,44 @@ void sealed_group_port::on_established(const datagram_source& with, std::uint32_
     if ((was_unknown || !received_.contains(with.member)) && peer != nullptr) {
         static_cast<void>(send(std::string_view{"BIND " + peer->name + ":cles\n"}));
     }
+    if (std::erase(outdated_, with) != 0) {
+        static_cast<void>(all_->send(with, announcement_));
+    }
+}
+
+// -- members with older and newer rosters --------------------------------------------------------------------------
+
+// In a new session: the member may have restarted, and not know an earlier one.
+void sealed_group_port::on_outdated(const datagram_source& outdated) {
+    if (announcement_.empty()) {
+        return;
+    }
+    if (std::ranges::find(outdated_, outdated) == outdated_.end()) {
+        if (outdated_.size() >= max_outdated) {
+            outdated_.erase(outdated_.begin());
+        }
+        outdated_.push_back(outdated);
+    }
+    all_->contact(outdated);
+}
+
+void sealed_group_port::on_announcement(const datagram_source& from, std::string_view line) {
+    is_behind_ = true;
+    if (const auto endpoints = endpoints_in(line, {.address = from.path.v4_address(), .port = from.path.port});
+        report_ && std::ranges::any_of(endpoints, is_tls) && all_->may_fetch_roster(from.member)) {
+        report_(from.member, endpoints);
+    }
+}
+
+// The others have not been able to read what this node has asked the group, nor this node their announcements.
+void sealed_group_port::on_roster() {
+    if (std::exchange(is_behind_, false) && owner_ != nullptr) {
+        static_cast<void>(send(std::string_view{"BIND all:cles\n"}));
+    }
 }
 
 void sealed_group_port::on_gave_up(const datagram_source& with, bool) {
+    std::erase(outdated_, with);
     if (const auto gone = unknown_.extract(with.member); !gone.empty() && report_) {
         report_(with.member, gone.mapped());
     }

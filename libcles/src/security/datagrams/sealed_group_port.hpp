@@ -19,10 +19,12 @@ namespace cles::security {
 
 /// A node's endpoint in the multicast group of a secured fleet (docs/security.md, "In the multicast group"): seals what
 /// it sends by another port, and delivers what it can open, with the sender. A sender of which it does not know the
-/// salt is contacted, and then asked to announce itself.
+/// salt is contacted, and then asked to announce itself. A member that has an old roster gets the last announcement of
+/// this node in a session, since it can open none in the group.
 class sealed_group_port final : public core::group_port, private core::group_listener, private datagram_socket {
   public:
-    /// A member did not answer; the endpoints are those that it has announced last.
+    /// A member did not answer, or has a newer roster; the endpoints are those that it has announced last, with the
+    /// address that it sends from in place of an unspecified one.
     using unanswered = std::function<void(std::uint32_t member, const std::vector<std::string>& endpoints)>;
 
     sealed_group_port(std::shared_ptr<sealed_datagrams> by, std::shared_ptr<core::group_port> port, unanswered report);
@@ -42,7 +44,9 @@ class sealed_group_port final : public core::group_port, private core::group_lis
     void on_writable() override;
     // datagram_socket
     void send_sealed(const datagram_path& to, bytes_view datagram) override;
-    void on_opened(const datagram_source&, std::uint32_t, std::string_view) override {} // nothing else is sent here
+    void on_opened(const datagram_source&, std::uint32_t, std::string_view) override {} // only announcements are sent
+    void on_announcement(const datagram_source& from, std::string_view line) override;
+    void on_outdated(const datagram_source& outdated) override;
     void on_established(const datagram_source& with, std::uint32_t epoch) override;
     void on_gave_up(const datagram_source& with, bool lost) override;
 
@@ -50,7 +54,8 @@ class sealed_group_port final : public core::group_port, private core::group_lis
         return datagram_path::v4(from.address, from.port, number_);
     }
     void on_group(const core::group_datagram& datagram);
-    void note_unknown(std::uint32_t member, std::string_view line);
+    void note_unknown(std::uint32_t member, std::string_view line, const core::group_source& from);
+    void on_roster();
 
     std::shared_ptr<sealed_datagrams> all_;
     std::shared_ptr<core::group_port> port_;
@@ -62,6 +67,11 @@ class sealed_group_port final : public core::group_port, private core::group_lis
     std::vector<std::uint16_t> sizes_;
     std::map<std::uint32_t, std::vector<std::string>> unknown_; // announced endpoints of members with unknown salts
     boost::unordered_flat_set<std::uint32_t> received_;         // members of which lines have been opened
+    std::string announcement_start_;
+    std::string announcement_;              // the last one of this node
+    std::vector<datagram_source> outdated_; // members that get it once there is a session
+    bool is_behind_ = false;                // a member has said that this node's roster is old
+    std::shared_ptr<void> observation_;
 };
 
 } // namespace cles::security

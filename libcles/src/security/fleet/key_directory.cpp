@@ -3,6 +3,7 @@
 
 #include "protocol/grammar.hpp"
 #include "security/fleet/member_file.hpp"
+#include "security/keys/certificate.hpp"
 
 #include <utility>
 
@@ -12,6 +13,7 @@ namespace {
 constexpr std::size_t max_key_file = 1024;
 constexpr const char* key_file = "key";
 constexpr const char* fleet_key_file = "fleet.key";
+constexpr const char* certificate_file = "tls.pem";
 constexpr const char* roster_file = "roster";
 constexpr const char* roster_lock = ".roster.lock";
 
@@ -71,6 +73,12 @@ node_identity key_directory::read_key() const {
     }
     return naming(folder_.path_of(key_file), [&] { return read_node_identity(content->view()); });
 }
+
+void key_directory::write_certificate(const signing_key& key) const {
+    folder_.replace_file(certificate_file, to_pem(key).view(), file_access::secret);
+}
+
+std::string key_directory::certificate_path() const { return folder_.path_of(certificate_file); }
 
 void key_directory::create_fleet_key(const signing_key& key) const {
     folder_.create_file(fleet_key_file, fleet_key_line(key).view(), file_access::secret);

@@ -36,6 +36,9 @@ class key_directory {
     [[nodiscard]] node_identity read_key() const;
     /// Writes `NAME.pub`.
     void write_public_identity(const public_identity& identity) const;
+    /// Writes `tls.pem`, with the private key and a certificate of it. Replaces an older one.
+    void write_certificate(const signing_key& key) const;
+    [[nodiscard]] std::string certificate_path() const;
     /// Creates `fleet.key`. An existing one is never replaced.
     void create_fleet_key(const signing_key& key) const;
     [[nodiscard]] signing_key read_fleet_key() const;

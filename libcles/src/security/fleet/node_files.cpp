@@ -60,6 +60,12 @@ node_description describe_node(const std::string& directory) {
     return describe(files, files.read_key());
 }
 
+std::string write_certificate(const std::string& directory) {
+    const key_directory files{directory};
+    files.write_certificate(files.read_key().key);
+    return files.certificate_path();
+}
+
 node_description join_fleet(const std::string& directory, std::string_view roster_line) {
     const key_directory files{directory};
     const auto own = files.read_key();

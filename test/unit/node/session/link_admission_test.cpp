@@ -189,6 +189,61 @@ BOOST_AUTO_TEST_CASE(silent_links_do_not_lock_out_others) {
     BOOST_TEST(gone().find("honest") == std::string::npos);
 }
 
+BOOST_AUTO_TEST_CASE(the_address_with_most_silent_links_gives_way_to_one_with_fewer) {
+    bounds.links = 8;
+    for (const auto* name : {"a", "b", "c"}) {
+        open(name, "10.0.0.1");
+    }
+    for (const auto* name : {"d", "e", "f", "g"}) {
+        open(name, "10.0.0.2");
+    }
+    talk("member", "10.0.0.3");
+    BOOST_TEST(open("h", "10.0.0.2").name == "busy"); // nobody has more, and all are new
+    BOOST_TEST(open("i", "10.0.0.4").name == "i");
+    BOOST_TEST(open("j", "10.0.0.4").name == "j");
+    BOOST_TEST(gone() == "d a "); // then both have three: the oldest
+    BOOST_TEST(talk("k", "10.0.0.5").name == "k");
+    BOOST_TEST(gone() == "e ");
+}
+
+// Several programs of one host start at the same time, while others say nothing.
+BOOST_AUTO_TEST_CASE(a_link_that_has_long_said_nothing_gives_way_to_further_ones_of_one_address) {
+    talk("member", "10.0.0.3");
+    open("silent", "10.0.0.1");
+    clock.advance(1s);
+    open("a", "10.0.0.2");
+    open("b", "10.0.0.2");
+    BOOST_TEST(open("c", "10.0.0.2").name == "c");
+    BOOST_TEST(gone() == "silent ");
+    BOOST_TEST(open("d", "10.0.0.2").name == "busy"); // those left are new
+}
+
+// Each address would be within any share of its own.
+BOOST_AUTO_TEST_CASE(many_addresses_that_say_nothing_do_not_shut_out_others) {
+    bounds.links = 1024;
+    constexpr int honest = 100;
+    int number = 0;
+    int served = 0;
+    const auto flood = [&](std::chrono::microseconds span) { // 200 addresses, 2,000 links a second
+        for (; span > 0us; span -= 500us, ++number) {
+            open("silent", "10.0.1." + std::to_string(number % 200));
+            clock.advance(500us);
+        }
+    };
+    flood(2s);
+    for (int i = 0; i < honest; ++i) {
+        flood(50ms);
+        auto& link = open("honest", "10.0.2." + std::to_string(i % 4));
+        flood(100ms); // until its first line, also if it is far away
+        if (link.name == "honest" && gone().find("honest") == std::string::npos) {
+            ++served;
+            link.watch.on_line(clock.now());
+            admission.leave(link.watch);
+        }
+    }
+    BOOST_TEST(served == honest);
+}
+
 BOOST_AUTO_TEST_CASE(a_flood_of_new_links_does_not_cost_a_search_each) {
     for (const auto* name : {"a", "b", "c", "d"}) {
         talk(name).rests = true;
