@@ -606,6 +606,27 @@ BOOST_FIXTURE_TEST_CASE(who_was_taken_for_lost_is_told, two_pools) {
     BOOST_TEST(hub.core().is_live("north"));
 }
 
+// Bridges of earlier versions know no line that says it of a single binding.
+BOOST_FIXTURE_TEST_CASE(when_the_node_closes_the_link_of_publications_all_is_bound_again, two_pools) {
+    for (const auto* const noun : {"car9:speed", "car9:pose"}) {
+        hub.ask("north", std::string{"BIND "} + noun);
+    }
+    nats.run_for(10ms);
+    const auto publications = *gate.bound_on.at("car9:speed").begin();
+    gate.close(publications);
+    nats.run_for(10ms);
+    BOOST_TEST(gate.bound.empty());
+    const auto told = nats.recorded("cles.south.bridge." + hub.core().self().instance + ".control");
+    BOOST_TEST(has_words(told, "PUSH self:cles/lost"));
+    BOOST_TEST(!has_words(told, "unbound"));
+    for (const auto* const noun : {"car9:speed", "car9:pose"}) {
+        BOOST_TEST(count(hub.lost, std::string{"binding "} + noun) == 1U, noun);
+        hub.ask("north", std::string{"BIND "} + noun);
+    }
+    nats.run_for(10ms);
+    BOOST_TEST(gate.bound.size() == 2U);
+}
+
 BOOST_FIXTURE_TEST_CASE(a_binding_ended_before_its_reply_does_not_remain, two_pools) {
     nats.impair().longest_delay = 5ms;
     hub.ask("north", "BIND car9:speed");
@@ -784,6 +805,58 @@ BOOST_FIXTURE_TEST_CASE(a_new_connection_begins_anew, two_pools) {
     const auto again = hub.ask("north", "PULL car9:echo");
     nats.run_for(10ms);
     BOOST_TEST(hub.answer(again) == "{}");
+}
+
+// -- a bridge that leaves ------------------------------------------------------------------------------------------
+
+BOOST_FIXTURE_TEST_CASE(a_bridge_that_leaves_waits_for_what_the_server_has_sent, two_pools) {
+    nats.impair() = {.shortest_delay = 30ms, .longest_delay = 30ms};
+    const auto id = hub.ask("north", "PUSH car9:echo {\"n\":1}");
+    gate.core().leave(nats.now());
+    BOOST_TEST(!gate.core().has_drained());
+    nats.run_for(29ms);
+    BOOST_TEST(!gate.core().has_drained());
+    nats.run_for(1ms);
+    BOOST_TEST(gate.core().has_drained());
+    nats.run_for(100ms);
+    BOOST_TEST(hub.answer(id) == "{\"n\":1}");
+}
+
+BOOST_FIXTURE_TEST_CASE(it_waits_for_half_a_second_at_most, two_pools) {
+    nats.lose = [](const std::string&, const std::string&) { return true; };
+    const auto begun = nats.now();
+    gate.core().leave(begun);
+    gate.core().on_time(begun + 499ms);
+    BOOST_TEST(!gate.core().has_drained());
+    BOOST_TEST((gate.core().due() <= begun + 500ms));
+    gate.core().on_time(begun + 500ms);
+    BOOST_TEST(gate.core().has_drained());
+    gate.disconnect();
+    gate.restart();
+    gate.core().leave(nats.now()); // not connected: the server has nothing for it
+    BOOST_TEST(gate.core().has_drained());
+}
+
+BOOST_FIXTURE_TEST_CASE(a_pool_has_left_when_its_last_bridge_has_left, two_pools) {
+    site second{nats, "north", "second"};
+    second.connect();
+    nats.run_for(2s);
+    BOOST_TEST(!hub.core().has_left("north"));
+    gate.core().say_left(nats.now());
+    nats.run_for(10ms);
+    BOOST_TEST(!hub.core().has_left("north"));
+    second.core().say_left(nats.now());
+    nats.run_for(10ms);
+    BOOST_TEST(hub.core().has_left("north"));
+    BOOST_TEST(!hub.core().has_left("nobody"));
+    gate.restart();
+    gate.connect();
+    nats.run_for(100ms);
+    BOOST_TEST(!hub.core().has_left("north"));
+    gate.restart(); // without a word
+    nats.run_for(2s);
+    BOOST_TEST(!hub.core().is_live("north"));
+    BOOST_TEST(!hub.core().has_left("north"));
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -17,8 +17,10 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -62,11 +64,20 @@ class played_nats {
             read();
         }
     }
-    void send(std::string_view filter, const std::string& subject, std::string_view text) {
-        write("MSG " + subject + " " + subscriptions_.at(std::string{filter}) + " " + std::to_string(text.size()) +
-              "\r\n" + std::string{text} + "\r\n");
+    void send(std::string_view filter, const std::string& subject, std::string_view text,
+              const std::string& reply = {}) {
+        write("MSG " + subject + " " + subscriptions_.at(std::string{filter}) + " " +
+              (reply.empty() ? "" : reply + " ") + std::to_string(text.size()) + "\r\n" + std::string{text} + "\r\n");
+    }
+    /// The filter of the bridge to which this subject belongs.
+    [[nodiscard]] static std::string inbox_of(const std::string& subject) {
+        return subject.substr(0, subject.rfind('.')) + ".*";
     }
     [[nodiscard]] bool subscribes(const std::string& filter) const { return subscriptions_.contains(filter); }
+    /// Called when the client ends the subscription to that filter, before it gets the reply to a further PING.
+    std::function<void(const std::string& filter)> on_end;
+    /// How many messages the client has got that it had sent to its own inbox.
+    [[nodiscard]] std::size_t returned() const noexcept { return returned_; }
     /// What the client has published on that subject.
     [[nodiscard]] std::vector<message> published(std::string_view subject) const {
         std::vector<message> found;
@@ -77,6 +88,13 @@ class played_nats {
 
   private:
     void write(const std::string& text) { asio::write(socket_, asio::buffer(text)); }
+    // What the client sends to its own inbox.
+    void deliver(const message& sent) {
+        if (const auto inbox = inbox_of(sent.subject); subscribes(inbox)) {
+            send(inbox, sent.subject, sent.text, sent.reply);
+            ++returned_;
+        }
+    }
     void read() {
         std::array<char, 65536> some{};
         input_.append(some.data(), socket_.read_some(asio::buffer(some)));
@@ -102,8 +120,15 @@ class played_nats {
             }
             published_.push_back({words.at(1), words.size() == 4 ? words.at(2) : "", input_.substr(size, length)});
             size += length + 2;
+            deliver(published_.back());
         } else if (words[0] == "SUB") {
             subscriptions_[words.at(1)] = words.back();
+        } else if (words[0] == "UNSUB") {
+            for (const auto& [filter, id] : subscriptions_) {
+                if (id == words.at(1) && on_end) {
+                    on_end(filter);
+                }
+            }
         } else if (words[0] == "PING") {
             is_connected_ = true;
             write("PONG\r\n");
@@ -116,6 +141,7 @@ class played_nats {
     tcp::acceptor acceptor_{io_, tcp::endpoint{asio::ip::address_v4::loopback(), 0}};
     tcp::socket socket_{io_};
     std::string input_;
+    std::size_t returned_ = 0;
     std::map<std::string, std::string> subscriptions_; // the last id of each filter
     std::vector<message> published_;
     bool is_connected_ = false;
@@ -157,7 +183,7 @@ struct fixture {
         const auto subject = "cles.north.bind.car1." + task;
         until([&] { return nats.published(subject).size() == times; });
         const auto reply = nats.published(subject).back().reply;
-        nats.send(reply.substr(0, reply.rfind('.')) + ".*", reply, "taken=" + std::string{by} + " {}");
+        nats.send(played_nats::inbox_of(reply), reply, "taken=" + std::string{by} + " {}");
         until([&] { return times == 1 ? feed.bound : feed.count(feed_event::rebound) == times - 1; });
     }
     void update(const std::string& task, int seq, const std::string& body) {
@@ -212,6 +238,38 @@ BOOST_AUTO_TEST_CASE(what_a_full_link_does_not_take_is_counted) {
     });
     BOOST_TEST(pose.missed() >= dropped);
     BOOST_TEST(metric(*hub, "updates_dropped_to_nats", "federation") == 0U);
+}
+
+// The server had sent it before it knew that the bridge takes no more.
+BOOST_AUTO_TEST_CASE(a_request_to_a_bridge_that_leaves_is_answered) {
+    nats.on_end = [this](const std::string& filter) {
+        if (filter == "cles.south.pull.*.*") {
+            nats.send(filter, "cles.south.pull.hub.speed", "", "_INBOX.1");
+        }
+    };
+    bool is_closed = false;
+    const auto begun = std::chrono::steady_clock::now();
+    hub->async_close(std::chrono::seconds{10}, [&](boost::system::error_code) { is_closed = true; });
+    until([&] { return nats.published("_INBOX.1").size() == 1U; });
+    const auto reply = nats.published("_INBOX.1")[0].text;
+    BOOST_TEST(reply.starts_with(R"({"error":"busy")"), reply);
+    until([&] { return is_closed; });
+    // Its own line came back, behind the request: without it, a bridge waits for half a second.
+    BOOST_TEST(nats.returned() != 0U);
+    BOOST_WARN((std::chrono::steady_clock::now() - begun < std::chrono::milliseconds{450}));
+}
+
+BOOST_AUTO_TEST_CASE(a_request_to_a_pool_that_has_left_fails_at_once) {
+    for (const auto by : {one, other}) {
+        beat(by, R"(,"leaving":true)");
+    }
+    until([&] { return metric(*hub, "bridges_lost", "federation") == 2U; });
+    boost::system::error_code why;
+    const auto begun = std::chrono::steady_clock::now();
+    hub->async_pull("north.car1:speed", [&](boost::system::error_code code, const cles::json_text&) { why = code; });
+    until([&] { return why.failed(); });
+    BOOST_TEST(why.message() == "none of its bridges is connected to NATS");
+    BOOST_TEST((std::chrono::steady_clock::now() - begun < std::chrono::seconds{2})); // for which others wait
 }
 
 BOOST_AUTO_TEST_SUITE_END()

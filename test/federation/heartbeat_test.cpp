@@ -33,7 +33,8 @@ BOOST_AUTO_TEST_CASE(it_is_read_as_written) {
                                          .leaving = true,
                                          .starting = true,
                                          .closing = true,
-                                         .roster = 7};
+                                         .roster = 7,
+                                         .sessions = true};
     BOOST_TEST((parse_heartbeat(text_of(full)) == full));
 }
 

@@ -80,7 +80,9 @@ BOOST_AUTO_TEST_SUITE(nats_reconnect)
 BOOST_AUTO_TEST_CASE(what_is_published_before_a_new_connection_is_noticed_is_not_sent_on_it) {
     one_server server;
     wakes woken;
-    cles::nats::nats_connection connection{{.servers = {server.url()}, .name = "test"}, [&woken] { woken.wake(); }};
+    const auto held =
+        cles::nats::nats_connection::start({.servers = {server.url()}, .name = "test"}, [&woken] { woken.wake(); });
+    auto& connection = *held;
     std::deque<event> taken;
     const auto next = [&] {
         while (taken.empty()) {

@@ -112,6 +112,7 @@ void site::restart() {
     subscriptions_.clear();
     running_.clear();
     bound.clear();
+    bound_on.clear();
     channel_.reset();
     bridge_ = std::make_unique<bridge>(bridge::settings{.pool = pool_, .node = node_}, *this,
                                        security_ ? static_cast<bridge_trust*>(this) : nullptr);
@@ -170,12 +171,36 @@ void site::cancel(const std::string& pool, std::uint64_t id, std::uint32_t link)
                      "PUSH self:cles/cancel/" + std::to_string(id) + " reply=no", nats_.now());
 }
 
-void site::update(const std::string& noun, std::uint64_t seq) {
-    if (bound.contains(noun)) {
-        bridge_->on_line({bridge_link::role::publications},
-                         "UPDATE " + noun + " seq=" + std::to_string(seq) +
-                             " epoch=5f3a09c1 {\"n\":" + std::to_string(seq) + "}",
-                         nats_.now());
+void site::update(const std::string& noun, std::uint64_t seq, const std::optional<bridge_link>& on,
+                  const std::string& epoch) {
+    const auto found = bound_on.find(noun);
+    if (found == bound_on.end()) {
+        return;
+    }
+    for (const auto& link : std::set{found->second}) {
+        if (!on || link == *on) {
+            bridge_->on_line(link,
+                             "UPDATE " + noun + " seq=" + std::to_string(seq) + " epoch=" + epoch +
+                                 " {\"n\":" + std::to_string(seq) + "}",
+                             nats_.now());
+        }
+    }
+}
+
+void site::close(const bridge_link& which) {
+    for (const auto& noun : std::set{bound}) {
+        unbind(noun, which);
+    }
+    bridge_->on_closed(which);
+}
+
+void site::unbind(const std::string& noun, const bridge_link& on) {
+    if (const auto found = bound_on.find(noun); found != bound_on.end()) {
+        found->second.erase(on);
+        if (found->second.empty()) {
+            bound_on.erase(found);
+            bound.erase(noun);
+        }
     }
 }
 
@@ -183,9 +208,10 @@ void site::receive(const std::string& subject, const std::string& reply, const s
     const received_message received{subject, reply, message, nats_.now()};
     if (channel_) {
         channel_->receive(received, *bridge_);
-        for (const auto& each : channel_->take_questions()) {
-            nats_.publish(each.subject, channel_->questions(), each.message);
+        for (const auto& each : channel_->take_ready(nats_.now())) {
+            nats_.publish(each.subject, each.reply, each.message);
         }
+        publish_questions();
     } else {
         bridge_->on_message(received);
     }
@@ -219,10 +245,19 @@ bool site::publish(std::string subject, std::string reply, std::string message, 
         return true;
     }
     if (channel_) {
-        message = channel_->seal(subject, reply, message);
-        if (message.empty()) { // it is no member
+        constexpr std::string_view stated = R"(,"sessions":true)";
+        if (const auto at = message.find(stated); !has_sessions && at != std::string::npos) {
+            message.erase(at, stated.size());
+        }
+        auto sealed = channel_->seal(subject, reply, message, nats_.now());
+        if (sealed.waits) {
+            publish_questions();
+            return true;
+        }
+        if (sealed.bytes.empty()) { // it is no member
             return false;
         }
+        message = std::move(sealed.bytes);
     }
     nats_.publish(subject, reply, message);
     return true;
@@ -280,12 +315,15 @@ void site::serve(const bridge_link& on, const std::string& line) {
     if (r.verb == verb::bind) {
         const auto noun = std::string{r.noun.target} + ":" + std::string{r.noun.path};
         if (r.unbinds()) {
-            bound.erase(noun);
+            unbind(noun, on);
             reply(on, r.id, "{}");
+        } else if (denied.contains(std::string{r.from})) {
+            reply(on, r.id, R"({"error":"denied","message":"car9 does not allow it"})");
         } else if (r.noun.task == "none") {
             reply(on, r.id, R"({"error":"no_task","message":"no BIND 'none'"})");
         } else {
             bound.insert(noun);
+            bound_on[noun].insert(on);
             reply(on, r.id, "{}");
         }
         return;
@@ -312,6 +350,7 @@ void site::lose_all(std::string_view) {
     lost.emplace_back("all");
     running_.clear();
     bound.clear();
+    bound_on.clear();
     delivered_.clear();
 }
 
@@ -338,6 +377,18 @@ std::optional<protocol::failure> site::refusal(std::string_view member, const pr
 void site::on_stated_roster(const bridge_id& by, std::uint32_t version) {
     rosters.push_back(by.instance + " " + std::to_string(version));
     channel_->on_stated_roster(by, version, nats_.now());
+}
+
+void site::on_stated_sessions(const bridge_id& by) {
+    if (has_sessions && !states_sessions_only) {
+        channel_->on_stated_sessions(by, nats_.now());
+    }
+}
+
+void site::publish_questions() {
+    for (const auto& each : channel_->take_questions()) {
+        nats_.publish(each.subject, channel_->questions(), each.message);
+    }
 }
 
 } // namespace cles::bridging::test

@@ -92,15 +92,19 @@ class site final : public bridge_output, private bridge_trust {
     /// The node asks on its link to that pool. Returns the id.
     std::uint64_t ask(const std::string& pool, const std::string& request, std::uint32_t link = 1);
     void cancel(const std::string& pool, std::uint64_t id, std::uint32_t link = 1);
-    /// The node publishes an update of a noun that the bridge has bound there.
-    void update(const std::string& noun, std::uint64_t seq);
+    /// The node publishes an update of a noun that the bridge has bound there, on each link on which it has. \param on
+    /// only on this one
+    void update(const std::string& noun, std::uint64_t seq, const std::optional<bridge_link>& on = {},
+                const std::string& epoch = "5f3a09c1");
+    /// The node closes that link of the bridge.
+    void close(const bridge_link& which);
     void receive(const std::string& subject, const std::string& reply, const std::string& message);
     [[nodiscard]] bool subscribes(std::string_view subject, bool shared) const;
     [[nodiscard]] std::uint64_t connection() const noexcept { return connection_; }
     [[nodiscard]] bridge& core() noexcept { return *bridge_; }
     /// A message as this site seals it. \pre it is of a secured fleet, and connected
     [[nodiscard]] std::string seal(std::string_view subject, std::string_view reply, std::string_view message) {
-        return channel_->seal(subject, reply, message);
+        return channel_->seal(subject, reply, message, nats_.now()).bytes;
     }
     /// The rights have changed.
     void change_security();
@@ -116,6 +120,8 @@ class site final : public bridge_output, private bridge_trust {
     std::map<std::uint64_t, std::vector<std::string>> answers; ///< to its own requests
     std::vector<std::string> updates;                          ///< lines
     std::set<std::string> bound;                               ///< nouns that the bridge has bound at the node
+    std::map<std::string, std::set<bridge_link>> bound_on;     ///< the same, and on which links
+    std::vector<bridge_link> ended;                            ///< links that the bridge has ended
     std::vector<std::string> lost; ///< what was lost: "pool north", "binding car9:speed", "all"
     std::vector<std::string> logged;
     int pools_changed = 0;
@@ -123,14 +129,18 @@ class site final : public bridge_output, private bridge_trust {
 
     // In a secured fleet.
     std::set<std::string> distrusted;       ///< members that may not forward for this node
+    std::set<std::string> denied;           ///< members for which no node here lets anything be bound
     mutable std::vector<std::string> binds; ///< whose rights were checked: "gate hub car9:speed" of gate, from=hub
     std::vector<std::string> rosters;       ///< versions that were stated: "<instance> 2"
+    bool has_sessions = true;               ///< false: as bridges of earlier versions
+    bool states_sessions_only = false;      ///< it does not note which others have them
 
   private:
     bool publish(std::string subject, std::string reply, std::string message, room in) override;
     void subscribe(std::string subject, bool shared) override;
     void unsubscribe(const std::string& subject) override;
     void deliver(const bridge_link& on, std::string line) override;
+    void end(const bridge_link& which) override { ended.push_back(which); }
     void lose_pool(std::string_view pool, std::string_view why) override;
     void lose_all(std::string_view why) override;
     void lose_binding(const bridge_link& on, const std::string& noun, std::string_view why) override;
@@ -145,9 +155,12 @@ class site final : public bridge_output, private bridge_trust {
     [[nodiscard]] std::uint32_t roster_version() const override { return security_->roster_version(); }
     void on_lost(const bridge_id& gone) override { channel_->forget(gone); }
     void on_stated_roster(const bridge_id& by, std::uint32_t version) override;
+    void on_stated_sessions(const bridge_id& by) override;
 
     void serve(const bridge_link& on, const std::string& line);
     void reply(const bridge_link& on, std::uint64_t id, const std::string& rest);
+    void unbind(const std::string& noun, const bridge_link& on);
+    void publish_questions();
     void tick();
 
     simulated_nats& nats_;

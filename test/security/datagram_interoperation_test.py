@@ -65,17 +65,20 @@ class Library(unittest.TestCase):
         self.assertEqual(int.from_bytes(payload[8:12], "big"), VERSION)
         self.assertEqual(payload[12:16].hex(), EPOCH)
 
-    def hello(self, me=None, fleet=None, number=CAR1, member=CAR2, epoch="0a0b0c0d", counter=40) -> bytes:
+    def hello(self, me=None, fleet=None, number=CAR1, member=CAR2, epoch="0a0b0c0d", counter=40, marked=False) -> bytes:
         """car2's HELLO, or one that is wrong somewhere. Its handshake is in `self.handshake`."""
         self.index = os.urandom(8)
         start = r.head(r.HELLO, member) + self.index
         self.handshake = r.Handshake(me or self.car2, self.car1.public, True,
                                      r.prologue((fleet or self.fleet).public, number, start), os.urandom(32))
-        return start + self.handshake.write(r.hello_payload(VERSION - 1, epoch, self.salt, counter))
+        hello = start + self.handshake.write(r.hello_payload(VERSION - 1, epoch, self.salt, counter))
+        return hello + r.hello_mac(me or self.car2, self.car1.public, (fleet or self.fleet).public, member, number,
+                                   hello) if marked else hello
 
     def welcome(self, hello: bytes, epoch="0a0b0c0d") -> bytes:
         """car2's answer to a HELLO of the library."""
-        self.assertEqual((len(hello), hello[:4]), (100, r.head(r.HELLO, CAR1)))
+        hello = r.read_hello(self.car2, CAR2, self.car1.public, self.fleet.public, hello)
+        self.assertEqual(hello[:4], r.head(r.HELLO, CAR1))
         handshake = r.Handshake(self.car2, self.car1.public, False, r.prologue(self.fleet.public, CAR2, hello[:12]),
                                 os.urandom(32))
         payload = handshake.read(hello[12:])
@@ -85,9 +88,9 @@ class Library(unittest.TestCase):
         return r.head(r.WELCOME, CAR2) + hello[4:12] + handshake.write(
             r.welcome_payload(self.index, VERSION, epoch, self.salt, 40))
 
-    def connect(self) -> None:
+    def connect(self, marked=False) -> None:
         """A session that car2 began."""
-        welcome = self.datagram(self.receive(self.hello())[0])
+        welcome = self.datagram(self.receive(self.hello(marked=marked))[0])
         self.assertEqual((len(welcome), welcome[:12]), (100, r.head(r.WELCOME, CAR1) + self.index))
         payload = self.handshake.read(welcome[12:])
         self.check_statement(payload)
@@ -102,6 +105,11 @@ class Library(unittest.TestCase):
         """The counter and the line of DATA from the library."""
         self.assertEqual(datagram[:12], r.head(r.DATA, CAR1) + self.index)
         return int.from_bytes(datagram[12:20], "big"), r.open_data(self.receiving, datagram)
+
+    def test_a_session_that_begins_with_a_mac(self):
+        self.connect(marked=True)
+        self.assertEqual(self.receive(self.data(0, b"PULL car1:speed id=1"))[1:],
+                         [f"opened {CAR2} 0a0b0c0d PULL car1:speed id=1"])
 
     def test_a_session_that_the_reference_begins(self):
         self.connect()
@@ -122,7 +130,8 @@ class Library(unittest.TestCase):
 
     def test_a_session_that_the_library_begins(self):
         hello, = self.command(f"send {CAR2} PULL car2:speed id=1")
-        self.assertEqual(self.command("wait 200"), [hello])
+        self.assertEqual(len(self.datagram(hello)), 116)
+        self.assertEqual(self.command("wait 200"), [hello, hello[:-32]])
         sent, established = self.receive(self.welcome(self.datagram(hello)))
         self.assertEqual(established, f"established {CAR2} {VERSION} 0a0b0c0d {self.salt.hex()} 40 -")
         self.sending, self.receiving = self.handshake.split()
@@ -147,7 +156,17 @@ class Library(unittest.TestCase):
     def test_hellos_that_are_not_answered(self):
         for wrong in ({"me": self.stranger}, {"fleet": self.other_fleet}, {"number": CAR2}, {"member": CAR1}, {"member": 6},
                       {"me": self.car1}):
-            self.assertEqual(self.receive(self.hello(**wrong)), [], str(wrong))
+            for marked in (False, True):
+                self.assertEqual(self.receive(self.hello(**wrong, marked=marked)), [], str(wrong))
+
+    def test_no_bit_of_a_mac_can_be_changed(self):
+        hello = self.hello(marked=True)
+        for place in range(100, 116):
+            for bit in range(8):
+                changed = bytearray(hello)
+                changed[place] ^= 1 << bit
+                self.assertEqual(self.receive(bytes(changed)), [])
+        self.assertEqual(len(self.receive(hello)), 1)
 
     def test_no_bit_of_data_can_be_changed(self):
         self.connect()
@@ -190,6 +209,10 @@ class Library(unittest.TestCase):
     def open_message(self, message: bytes, subject="cles.x", reply="-") -> list:
         return self.command(f"open_message {subject} {reply} {r.instance(CAR2, self.salt)} car2.seal {message.hex()}")
 
+    def open_for(self, message: bytes) -> list:
+        """As a message for one bridge."""
+        return self.command(f"open_for cles.x - {r.instance(CAR2, self.salt)} car2.seal {message.hex()}")
+
     def question(self, message: bytes) -> list:
         return self.command(f"question questions {r.instance(CAR2, self.salt)} car2.seal {message.hex()}")
 
@@ -223,6 +246,53 @@ class Library(unittest.TestCase):
         heartbeat, answer = self.question(self.message(b"ask " + challenge, 2002, "questions", "car2.seal"))
         self.assertEqual(heartbeat, "heartbeat")
         self.assertEqual(self.opened(answer, "car2.seal", "questions"), b"live " + challenge)
+
+    def test_a_session_of_two_bridges(self):
+        car2 = r.instance(CAR2, self.salt)
+        car1 = int(self.command("instance")[0].split()[1])
+        _, asked = self.open_message(self.message(b"request", 40))
+        challenge = self.opened(asked, "car2.seal", "questions").split()[1]
+        self.question(self.message(b"live " + challenge, 41, "questions", "car2.seal"))
+
+        hello, = self.command(f"able {car2} car2.seal")
+        index, first = r.read_session_question("hello", self.opened(hello, "car2.seal", "questions").decode())
+        self.assertEqual(self.command(f"seal_for {car2} cles.a cles.b early"), ["waits"])
+        handshake = r.Handshake(self.car2, self.car1.public, False, r.session_prologue(self.fleet.public, car1, car2, index),
+                                os.urandom(32))
+        self.assertEqual(handshake.read(first), b"")
+        of_session = os.urandom(8)
+        welcome = r.session_question("welcome", index, handshake.write(of_session)).encode()
+        self.assertEqual(self.question(self.message(welcome, 42, "questions", "car2.seal")), [])
+        for counter in range(2):
+            sealed, = self.command(f"seal_for {car2} cles.a cles.b PULL car2:speed {counter}")
+            message = bytes.fromhex(sealed.removeprefix("sealed "))
+            self.assertEqual(message[1:25], car1.to_bytes(8, "big") + of_session + counter.to_bytes(8, "big"))
+            self.assertEqual(r.open_session(handshake.split()[1], "cles.a", "cles.b", message),
+                             f"PULL car2:speed {counter}".encode())
+
+        index = os.urandom(8)
+        handshake = r.Handshake(self.car2, self.car1.public, True, r.session_prologue(self.fleet.public, car2, car1, index),
+                                os.urandom(32))
+        hello = r.session_question("hello", index, handshake.write(b"")).encode()
+        answer, = self.question(self.message(hello, 43, "questions", "car2.seal"))
+        back, second = r.read_session_question("welcome", self.opened(answer, "car2.seal", "questions").decode())
+        self.assertEqual(back, index)
+        of_session = handshake.read(second)
+        key = handshake.split()[0]
+        sealed = [r.seal_session(key, car2, of_session, counter, "cles.x", "", b"request") for counter in (0, 1, 0, 2000, 976)]
+        self.assertEqual([self.open_for(each) for each in sealed],
+                         [["opened car2 request"], ["opened car2 request"], ["refused  "], ["opened car2 request"], ["refused  "]])
+        for place in range(1, len(sealed[0])):
+            changed = bytearray(r.seal_session(key, car2, of_session, 2001, "cles.x", "", b"request"))
+            changed[place] ^= 1 << place % 8
+            self.assertEqual(self.open_for(bytes(changed))[0], "refused  ")
+        # What is signed counts for all bridges only.
+        self.assertEqual(self.open_for(self.message(b"request", 44)), ["refused  "])
+        self.assertEqual(self.open_message(self.message(b"heartbeat", 45)), ["opened car2 heartbeat"])
+        self.command("wait 1000")
+        refused, told = self.open_for(r.seal_session(key, car2, bytes(8), 0, "cles.x", "", b"request"))
+        self.assertEqual(refused, "refused  ")
+        self.assertEqual(self.opened(told, "car2.seal", "questions"), b"unknown " + b"0" * 16)
 
     def test_no_bit_of_a_message_can_be_changed(self):
         message = self.message(b"request", 40)

@@ -2,10 +2,13 @@
 """Writes vectors.json: values of every format of docs/security.md, made from fixed keys, for other implementations.
 
     make_vectors.py         prints the vectors
+    make_vectors.py --add   prints those of vectors.json, and those that are not in it yet
 """
 
 import hashlib
 import json
+import sys
+from pathlib import Path
 
 import reference as r
 from nacl import bindings as sodium
@@ -46,6 +49,17 @@ initiator.read(welcome[12:])
 line = "PULL car2:localization id=5"
 reply = 'id=5 {"utc":2}'
 pool_subject, pool_reply, pool_message = "cles.a.pull.car1.speed", "cles.b.reply.1", "PULL car1:speed/front {}"
+instance1, instance2 = r.instance(1, salt1), r.instance(3, salt2)
+session_prologue = r.session_prologue(fleet.public, instance1, instance2, index1)
+session_initiator = r.Handshake(car1, car2.public, True, session_prologue, seed("ephemeral of car1"))
+session_responder = r.Handshake(car2, car1.public, False, session_prologue, seed("ephemeral of car2"))
+session_hello = session_initiator.write(b"")
+session_responder.read(session_hello)
+session_welcome = session_responder.write(index2)
+session_initiator.read(session_welcome)
+session_key = session_initiator.split()[0]
+session_subject = f"cles.b.bridge.{instance2:016x}.request"
+session_reply = f"cles.a.bridge.{instance1:016x}.7"
 update = 'UPDATE car2:localization seq=17 epoch=5f3a09c1 {"utc":2}'
 announced = ('{"node":"car2","endpoints":["tls://10.0.0.3:25370"],"interval_ms":1000,"tasks":"85944171f73967e8",'
              '"signed":["localization"],"roster":7}')
@@ -73,7 +87,8 @@ vectors = {
     "handshake": {
         "initiator": "car1", "responder": "car2", "prologue": shared.hex(),
         "ephemeral_secrets": [seed("ephemeral of car1").hex(), seed("ephemeral of car2").hex()],
-        "hello": hello.hex(), "welcome": welcome.hex(), "hash": initiator.hash.hex(),
+        "hello": hello.hex(), "hello_mac": r.hello_mac(car1, car2.public, fleet.public, 1, 3, hello).hex(),
+        "welcome": welcome.hex(), "hash": initiator.hash.hex(),
         "initiator_sends_with": sending.hex(), "responder_sends_with": receiving.hex(),
     },
     "data": [
@@ -86,6 +101,15 @@ vectors = {
              "subject": pool_subject, "reply": pool_reply, "message": pool_message,
              "sealed": r.seal_pool(current, fleet.public, car2, 3, 5, salt2, 17, pool_subject, pool_reply,
                                    pool_message.encode()).hex()},
+    "pool_session": {"initiator": "car1", "responder": "car2", "instances": [f"{instance1:016x}", f"{instance2:016x}"],
+                     "prologue": session_prologue.hex(),
+                     "ephemeral_secrets": [seed("ephemeral of car1").hex(), seed("ephemeral of car2").hex()],
+                     "hello_index": index1.hex(), "hello": r.session_question("hello", index1, session_hello),
+                     "index": index2.hex(), "welcome": r.session_question("welcome", index1, session_welcome),
+                     "key": session_key.hex(), "counter": 0, "subject": session_subject, "reply": session_reply,
+                     "message": pool_message,
+                     "sealed": r.seal_session(session_key, instance1, index2, 0, session_subject, session_reply,
+                                              pool_message.encode()).hex()},
     "ask": {"from": "car1", "version": 7, "message": r.ask(1, 7).hex()},
     "given_roster": {"from": "car2", "to": "car1", "message": r.give_roster(3, car1.public, roster).hex()},
     "signed_request": signed_request(b""),
@@ -96,4 +120,7 @@ vectors = {
                   "sig": signed_update("cles", 18, announced),
                   "sig_of_reply": signed_update(f"cles/announced/{challenge}", 18, announced)},
 }
+if sys.argv[1:] == ["--add"]: # what is drawn at random stays as it is
+    kept = json.loads((Path(__file__).resolve().parent / "vectors.json").read_text())
+    vectors = {name: kept.get(name, made) for name, made in vectors.items()}
 print(json.dumps(vectors, indent=2))

@@ -327,6 +327,28 @@ def prologue(fleet: bytes, responder: int, hello_head: bytes) -> bytes:
     return b"cles datagram 1\n" + fleet + responder.to_bytes(3, "big") + hello_head
 
 
+HELLO_BYTES, MAC_BYTES = 100, 16
+
+
+def hello_mac(me: Identity, peer: bytes, fleet: bytes, sender: int, responder: int, hello: bytes) -> bytes:
+    """Of the first 100 bytes of HELLO. `me` is either of both ends, and `peer` the other one's key."""
+    agreed = dh(me.dh_secret, x25519_of(peer))
+    numbers = sender.to_bytes(3, "big") + responder.to_bytes(3, "big")
+    key = hmac.digest(agreed, b"cles hello 1\n" + fleet + numbers, "sha256")
+    return hmac.digest(key, hello, "sha256")[:MAC_BYTES]
+
+
+def read_hello(me: Identity, number: int, peer: bytes, fleet: bytes, datagram: bytes) -> bytes:
+    """The 100 bytes that are opened. A MAC may be missing, but not be wrong."""
+    hello, mac = datagram[:HELLO_BYTES], datagram[HELLO_BYTES:]
+    if len(hello) != HELLO_BYTES or hello[0] != HELLO or len(mac) not in (0, MAC_BYTES):
+        raise Refused("not HELLO")
+    expected = hello_mac(me, peer, fleet, int.from_bytes(hello[1:4], "big"), number, hello)
+    if mac and not hmac.compare_digest(mac, expected):
+        raise Refused("a wrong MAC")
+    return hello
+
+
 def hello_payload(version: int, epoch: str, salt: bytes, counter: int) -> bytes:
     return welcome_payload(bytes(8), version, epoch, salt, counter)
 
@@ -363,7 +385,7 @@ def open_group(key: bytes, datagram: bytes) -> bytes:
 
 # --- Messages through NATS -----------------------------------------------------------------------------------------------
 
-POOL, ASK, ROSTER = 0x85, 0x86, 0x87
+POOL, ASK, ROSTER, SESSION = 0x85, 0x86, 0x87, 0x88
 
 
 def instance(member: int, salt: bytes) -> int:
@@ -397,6 +419,40 @@ def open_pool(key: bytes, fleet: bytes, sender: bytes, subject: str, reply: str,
         raise Refused("not authentic") from error
     verify(sender, pool_texts(fleet, sealed[:32], subject, reply, plain[64:])[1], plain[:64])
     return plain[64:]
+
+
+def session_prologue(fleet: bytes, initiator: int, responder: int, index: bytes) -> bytes:
+    return b"cles pool session 1\n" + fleet + initiator.to_bytes(8, "big") + responder.to_bytes(8, "big") + index
+
+
+def session_question(word: str, index: bytes, handshake: bytes) -> str:
+    """`hello` and `welcome`: the index is that of HELLO."""
+    return f"{word} {text(index + handshake)}"
+
+
+def read_session_question(word: str, question: str) -> tuple[bytes, bytes]:
+    """The index of HELLO, and the message of the handshake."""
+    head, _, value = question.partition(" ")
+    if head != word:
+        raise Refused(f"not {word}")
+    whole_value = binary(value, {"hello": 8 + 48, "welcome": 8 + 56}[word])
+    return whole_value[:8], whole_value[8:]
+
+
+def seal_session(key: bytes, sender: int, index: bytes, counter: int, subject: str, reply: str, message: bytes) -> bytes:
+    if "\n" in subject + reply:
+        raise Refused("a line end")
+    start = bytes([SESSION]) + sender.to_bytes(8, "big") + index + counter.to_bytes(8, "big")
+    return start + encrypt(key, counter, start + f"{subject}\n{reply}".encode(), message)
+
+
+def open_session(key: bytes, subject: str, reply: str, sealed: bytes) -> bytes:
+    if len(sealed) < 41 or sealed[0] != SESSION:
+        raise Refused("not SESSION")
+    if "\n" in subject + reply:
+        raise Refused("a line end")
+    counter = int.from_bytes(sealed[17:25], "big")
+    return decrypt(key, counter, sealed[:25] + f"{subject}\n{reply}".encode(), sealed[25:])
 
 
 def ask(member: int, version: int) -> bytes:

@@ -228,6 +228,30 @@ class Handshake(unittest.TestCase):
         self.assertEqual([key.hex() for key in first.split()],
                          [vector["initiator_sends_with"], vector["responder_sends_with"]])
 
+    def test_the_mac_of_the_vector_holds(self):
+        hello = bytes.fromhex(VECTORS["handshake"]["hello"])
+        mac = bytes.fromhex(VECTORS["handshake"]["hello_mac"])
+        self.assertEqual(r.hello_mac(CAR1, CAR2.public, FLEET.public, 1, 3, hello), mac)
+        self.assertEqual(r.hello_mac(CAR2, CAR1.public, FLEET.public, 1, 3, hello), mac)
+        for datagram in (hello, hello + mac):
+            self.assertEqual(r.read_hello(CAR2, 3, CAR1.public, FLEET.public, datagram), hello)
+
+    def test_another_mac_is_refused(self):
+        hello = bytes.fromhex(VECTORS["handshake"]["hello"])
+        mac = bytes.fromhex(VECTORS["handshake"]["hello_mac"])
+        wrong = [hello + mac[:-1], hello + mac + b"x", mac, hello[:-1]]
+        for place in range(1, len(hello + mac)):
+            changed = bytearray(hello + mac)
+            changed[place] ^= 1 << random.randrange(8)
+            wrong.append(bytes(changed))
+        for datagram in wrong:
+            with self.assertRaises(r.Refused):
+                r.read_hello(CAR2, 3, CAR1.public, FLEET.public, datagram)
+        for ends in ((CAR2, 1, CAR1.public, FLEET.public), (CAR2, 3, FLEET.public, FLEET.public),
+                     (FLEET, 3, CAR1.public, FLEET.public), (CAR2, 3, CAR1.public, CAR1.public)):
+            with self.assertRaises(r.Refused):
+                r.read_hello(*ends, hello + mac)
+
     def test_who_else_sends_hello_is_refused(self):
         hello = bytes.fromhex(VECTORS["handshake"]["hello"])
         other = bytearray(hello[:12])
@@ -304,6 +328,50 @@ class Datagrams(unittest.TestCase):
                 changed[place] ^= 1 << bit
                 with self.assertRaises(r.Refused):
                     self.open_pool(bytes(changed))
+
+    def test_a_session_of_two_bridges_begins(self):
+        vector = VECTORS["pool_session"]
+        instances = [int(each, 16) for each in vector["instances"]]
+        index, first = r.read_session_question("hello", vector["hello"])
+        again, second = r.read_session_question("welcome", vector["welcome"])
+        self.assertEqual((index.hex(), again.hex()), (vector["hello_index"], vector["hello_index"]))
+        prologue = r.session_prologue(FLEET.public, *instances, index)
+        self.assertEqual(prologue.hex(), vector["prologue"])
+        secrets = [bytes.fromhex(each) for each in vector["ephemeral_secrets"]]
+        initiator = r.Handshake(CAR1, CAR2.public, True, prologue, secrets[0])
+        responder = r.Handshake(CAR2, CAR1.public, False, prologue, secrets[1])
+        self.assertEqual(initiator.write(b""), first)
+        self.assertEqual(responder.read(first), b"")
+        self.assertEqual(responder.write(bytes.fromhex(vector["index"])), second)
+        self.assertEqual(initiator.read(second).hex(), vector["index"])
+        self.assertEqual(initiator.split()[0].hex(), vector["key"])
+        self.assertEqual(responder.split()[1].hex(), vector["key"])
+        for parties in ((instances[1], instances[0]), (instances[0], instances[0])):
+            other = r.Handshake(CAR2, CAR1.public, False, r.session_prologue(FLEET.public, *parties, index), secrets[1])
+            with self.assertRaises(r.Refused):
+                other.read(first)
+        for wrong in (vector["hello"][:-1], vector["hello"] + "A", vector["welcome"], "hello"):
+            with self.assertRaises(r.Refused):
+                r.read_session_question("hello", wrong)
+
+    def test_messages_of_a_session_are_opened(self):
+        vector = VECTORS["pool_session"]
+        key, sealed = bytes.fromhex(vector["key"]), bytes.fromhex(vector["sealed"])
+        subjects = vector["subject"], vector["reply"]
+        self.assertEqual(r.open_session(key, *subjects, sealed), vector["message"].encode())
+        self.assertEqual(r.seal_session(key, int(vector["instances"][0], 16), bytes.fromhex(vector["index"]),
+                                        vector["counter"], *subjects, vector["message"].encode()), sealed)
+        for wrong in (("x", vector["reply"]), (vector["subject"], ""), (vector["subject"], "a\nb")):
+            with self.assertRaises(r.Refused, msg=str(wrong)):
+                r.open_session(key, *wrong, sealed)
+        for place in range(len(sealed)):
+            with self.assertRaises(r.Refused):
+                r.open_session(key, *subjects, sealed[:place])
+            for bit in range(8):
+                changed = bytearray(sealed)
+                changed[place] ^= 1 << bit
+                with self.assertRaises(r.Refused):
+                    r.open_session(key, *subjects, bytes(changed))
 
     def test_a_roster_is_asked_for_and_given(self):
         asked, given = bytes.fromhex(VECTORS["ask"]["message"]), bytes.fromhex(VECTORS["given_roster"]["message"])

@@ -9,6 +9,11 @@
 #include <utility>
 
 namespace cles::bridging {
+namespace {
+
+constexpr std::chrono::milliseconds drain_limit{500}; // if the server does not answer
+
+} // namespace
 
 bridge::bridge(const settings& setup, bridge_output& out, bridge_trust* trust)
     : max_line_(setup.max_line), out_(out), trust_(trust), nats_(setup.pool, out),
@@ -44,10 +49,17 @@ void bridge::leave(time_point now) {
     if (!std::exchange(leaving_, true)) {
         inbound_.leave();
         presence_.leave(now);
+        if (is_connected()) { // the server sends it after all that it has sent before
+            drained_by_ = now + drain_limit;
+            nats_.send_control(self(), std::string{drained_line});
+        }
     }
 }
 
 void bridge::on_time(time_point now) {
+    if (drained_by_ && *drained_by_ <= now) {
+        drained_by_.reset();
+    }
     if (is_connected()) {
         presence_.on_time(now);
         inbound_.on_time(now);
@@ -165,12 +177,18 @@ void bridge::on_control(const received_message& m) {
         published_.unbind(noun_of(r), stated);
     } else if (m.text == names_line) {
         presence_.on_asked_for_names(m.at);
+    } else if (m.text == drained_line) {
+        if (stated == self()) {
+            drained_by_.reset();
+        }
     } else if (m.text == lost_line) {
         presence_.on_forgotten_by(stated, m.at);
     } else if (const auto number = cancelled_number(r)) {
         if (!inbound_.cancel(stated, *number)) {
-            published_.cancel({stated, std::string{m.reply}});
+            published_.cancel(stated, m.reply);
         }
+    } else if (const auto bound = unbound_number(r)) {
+        outbound_.on_unbound(stated, *bound);
     } else {
         nats_.drop(m, "it is not a message of a bridge");
     }
@@ -185,7 +203,7 @@ void bridge::on_line(const bridge_link& from, std::string_view line, time_point 
     switch (from.what) {
     case bridge_link::role::to_pool: outbound_.on_line(from, line, now); break;
     case bridge_link::role::from_pool: inbound_.on_line(line); break;
-    case bridge_link::role::publications: published_.on_line(line); break;
+    case bridge_link::role::publications: published_.on_line(from, line); break;
     }
 }
 
@@ -193,7 +211,13 @@ void bridge::on_closed(const bridge_link& which) {
     switch (which.what) {
     case bridge_link::role::to_pool: outbound_.on_closed(which); break;
     case bridge_link::role::from_pool: inbound_.on_closed(which); break;
-    case bridge_link::role::publications: published_.on_closed(); break;
+    case bridge_link::role::publications:
+        if (leaving_ && which.member.empty()) {
+            published_.clear(); // the last heartbeat says it, when what the server has for this bridge is answered
+        } else {
+            published_.on_closed(which);
+        }
+        break;
     }
 }
 

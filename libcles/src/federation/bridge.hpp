@@ -14,6 +14,7 @@
 #include "federation/published_nouns.hpp"
 #include "federation/received_message.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -60,9 +61,13 @@ class bridge final {
     void on_batch() { inbound_.on_batch(); }
     /// To be called at `due`, and when the node's pool has changed.
     void on_time(time_point now);
-    [[nodiscard]] time_point due() const noexcept { return is_connected() ? presence_.due() : time_point::max(); }
+    [[nodiscard]] time_point due() const noexcept {
+        return is_connected() ? std::min(presence_.due(), drained_by_.value_or(time_point::max())) : time_point::max();
+    }
     /// Takes no more requests. Those in flight continue.
     void leave(time_point now);
+    /// After `leave`: whether what the server had for this bridge has been received, so that it may end.
+    [[nodiscard]] bool has_drained() const noexcept { return leaving_ && (!is_connected() || !drained_by_); }
     /// The node has closed all links: tells the others that this bridge is gone.
     void say_left(time_point now) { presence_.say_left(now); }
 
@@ -78,6 +83,8 @@ class bridge final {
     }
     /// Whether requests can be sent to that pool now.
     [[nodiscard]] bool is_live(std::string_view pool) const { return is_connected() && presence_.is_reachable(pool); }
+    /// Whether its last bridge has left in order: requests to it need not wait for another one.
+    [[nodiscard]] bool has_left(std::string_view pool) const { return is_connected() && pools().has_left(pool); }
     [[nodiscard]] bool is_connected() const noexcept { return nats_.is_open(); }
     [[nodiscard]] const pool_table& pools() const noexcept { return presence_.pools(); }
     [[nodiscard]] const bridge_figures& counted() const noexcept { return nats_.counts(); }
@@ -100,6 +107,7 @@ class bridge final {
     bridge_output& out_;
     bridge_trust* trust_; // null: the fleet is not secured
     bool leaving_ = false;
+    std::optional<time_point> drained_by_; // when it ends in any case, while it waits for what the server has
     bridge_connection nats_;
     bridge_presence presence_;
     outbound_requests outbound_;

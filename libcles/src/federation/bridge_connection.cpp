@@ -52,6 +52,10 @@ void bridge_connection::send_control(const bridge_id& to, std::string line) {
     publish_short(control_subject(to), std::move(line), control_subject(self_));
 }
 
+void bridge_connection::send_cancel(const bridge_id& to, std::uint64_t number) {
+    publish_short(control_subject(to), cancel_line(number), reply_subject(self_, number));
+}
+
 void bridge_connection::drop(const received_message& m, std::string_view why) {
     ++counts_.messages_refused;
     if (next_drop_log_ <= m.at) {

@@ -53,6 +53,8 @@ class bridge_connection {
     void refuse(std::string_view to, const protocol::failure& why);
     /// A line for another bridge.
     void send_control(const bridge_id& to, std::string line);
+    /// The request of this bridge with that number is cancelled, or what it has bound is over.
+    void send_cancel(const bridge_id& to, std::uint64_t number);
 
     /// The message has no effect.
     void drop(const received_message& m, std::string_view why);

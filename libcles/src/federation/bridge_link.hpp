@@ -13,11 +13,14 @@ struct bridge_link {
         to_pool,     ///< opened by the node: its requests to the pool
         from_pool,   ///< opened by the bridge: the pool's requests; without a pool, those of programs that use NATS
         publications ///< opened by the bridge: the nouns that are published for other pools
+                     ///< (in a secured fleet, those of one requester)
     };
     role what = role::to_pool;
     std::string pool{};
     std::uint32_t number = 0; ///< of links that the node opens, since it may need several to one pool
-    std::string member{};     ///< in a secured fleet, the bridge from which requests come: each has a link of its own
+    /// In a secured fleet, the bridge from which requests come, or the member for which nouns are bound: each has a
+    /// link of its own.
+    std::string member{};
 
     auto operator<=>(const bridge_link&) const = default; // NOLINT(modernize-use-nullptr): not about pointers
 };

@@ -12,8 +12,8 @@
 
 namespace cles::bridging {
 
-/// What a bridge does outside itself. Of it, only `deliver` to a link from another pool calls the bridge: `on_closed`,
-/// if the node refuses the link.
+/// What a bridge does outside itself. Of it, only `deliver` to a link that it opens calls the bridge: `on_closed`, if
+/// the node refuses the link.
 class bridge_output {
   public:
     bridge_output() = default;
@@ -32,6 +32,8 @@ class bridge_output {
 
     /// A line for the node, without LF. Opens the link if it is not `to_pool` and not open.
     virtual void deliver(const bridge_link& on, std::string line) = 0;
+    /// No line follows on that link. The bridge is not told when it has closed.
+    virtual void end(const bridge_link& which) = 0;
     /// The links to and from that pool are lost.
     virtual void lose_pool(std::string_view pool, std::string_view why) = 0;
     virtual void lose_all(std::string_view why) = 0;

@@ -121,7 +121,8 @@ void bridge_presence::send_heartbeat(bool starting, time_point now) {
                          .leaving = left_,
                          .starting = starting || starting_until_,
                          .closing = closing_,
-                         .roster = trust_ != nullptr ? trust_->roster_version() : 0};
+                         .roster = trust_ != nullptr ? trust_->roster_version() : 0,
+                         .sessions = trust_ != nullptr};
     if (!left_ && !starting_until_) {
         pools_.on_heartbeat(nats_.self(), said, now); // so that `publisher_of` considers it
     }
@@ -174,8 +175,12 @@ void bridge_presence::on_heartbeat(const received_message& m) {
         remove({id.pool, said->replaces}, "has connected to NATS again", now);
     }
     if (said->leaving) {
+        pools_.note_leaving(id);
         remove(id, "has left", now);
         return;
+    }
+    if (trust_ != nullptr && said->sessions) { // before anything is sent to it
+        trust_->on_stated_sessions(id);
     }
     if (trust_ != nullptr && said->starting) { // it takes no requests yet, but wants to know this bridge
         announce_soon(now);

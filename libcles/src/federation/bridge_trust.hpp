@@ -31,6 +31,8 @@ class bridge_trust {
     virtual void on_lost(const bridge_id& gone) = 0;
     /// A bridge has stated the version of its roster.
     virtual void on_stated_roster(const bridge_id& by, std::uint32_t version) = 0;
+    /// A bridge has stated that it has sessions.
+    virtual void on_stated_sessions(const bridge_id& by) = 0;
 
   protected:
     ~bridge_trust() = default;

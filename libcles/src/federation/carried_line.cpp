@@ -14,6 +14,17 @@ namespace {
 constexpr std::string_view crossed = ".nats";
 constexpr std::string_view taken_key = "taken=";
 constexpr std::string_view cancel_path = "cles/cancel/";
+constexpr std::string_view unbound_path = "cles/unbound/";
+
+std::string numbered_line(std::string_view path, std::uint64_t number) {
+    return std::string{"PUSH self:"}.append(path).append(std::to_string(number));
+}
+
+std::optional<std::uint64_t> number_after(std::string_view path, const protocol::request_line& r) noexcept {
+    return r.noun.path.starts_with(path)
+               ? std::optional{protocol::parse_number(r.noun.path.substr(path.size())).value_or(0)}
+               : std::nullopt;
+}
 
 // Appends the adverbs, without `id`, and the body. \param home of the names in `via`; nothing: `via` is left out
 // \param deadline_ms instead of the request's; 0: that one
@@ -145,15 +156,16 @@ std::string_view take_taker(std::string_view& message) noexcept {
     return instance;
 }
 
-std::string cancel_line(std::uint64_t number) {
-    return std::string{"PUSH self:"}.append(cancel_path).append(std::to_string(number));
-}
+std::string cancel_line(std::uint64_t number) { return numbered_line(cancel_path, number); }
 
 std::optional<std::uint64_t> cancelled_number(const protocol::request_line& request) noexcept {
-    const auto path = request.noun.path;
-    return path.starts_with(cancel_path)
-               ? std::optional{protocol::parse_number(path.substr(cancel_path.size())).value_or(0)}
-               : std::nullopt;
+    return number_after(cancel_path, request);
+}
+
+std::string unbound_line(std::uint64_t number) { return numbered_line(unbound_path, number); }
+
+std::optional<std::uint64_t> unbound_number(const protocol::request_line& request) noexcept {
+    return number_after(unbound_path, request);
 }
 
 } // namespace cles::bridging

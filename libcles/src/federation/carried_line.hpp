@@ -59,9 +59,15 @@ std::string taken_text(std::string_view instance);
 /// Lines of bridges to each other.
 inline constexpr std::string_view lost_line = "PUSH self:cles/lost";
 inline constexpr std::string_view names_line = "PULL self:cles/names";
+/// Of a bridge that leaves, to itself: what the server has sent before is received.
+inline constexpr std::string_view drained_line = "PUSH self:cles/drained";
 /// Of a bridge, or between bridge and node.
 std::string cancel_line(std::uint64_t number);
 /// The number that is cancelled, 0 if it cannot be one; nothing: the request cancels nothing.
 std::optional<std::uint64_t> cancelled_number(const protocol::request_line& request) noexcept;
+/// To the bridge that has sent the BIND of that number: what it has bound is over.
+std::string unbound_line(std::uint64_t number);
+/// That number, as of `cancelled_number`.
+std::optional<std::uint64_t> unbound_number(const protocol::request_line& request) noexcept;
 
 } // namespace cles::bridging

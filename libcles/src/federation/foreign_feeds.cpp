@@ -3,6 +3,7 @@
 
 #include "federation/carried_line.hpp"
 
+#include <algorithm>
 #include <tuple>
 #include <utility>
 
@@ -11,6 +12,7 @@ namespace {
 
 auto subject_key(const foreign_noun& n) { return std::tie(n.pool, n.node, n.task); }
 auto noun_key(const foreign_noun& n) { return std::tie(n.pool, n.node, n.task, n.parameters); }
+auto requester_key(const foreign_noun& n) { return std::tie(n.pool, n.node, n.task, n.parameters, n.requester); }
 
 // Whether one is bound that has this key. \param first of those that may have it
 template <class Bindings, class Key>
@@ -41,9 +43,8 @@ void foreign_feeds::erase(bindings::iterator which, bool tells) {
     if (!has_key(bound_, {noun.pool, noun.node, noun.task}, subject_key)) {
         out_.unsubscribe(noun.subject());
     }
-    const auto& taker = gone.mapped().taker;
-    if (tells && !taker.empty() && !has_key(bound_, {noun.pool, noun.node, noun.task, noun.parameters}, noun_key)) {
-        end_at(taker, noun);
+    if (tells) {
+        end_at(gone.mapped().taker, noun, gone.mapped().numbers);
     }
 }
 
@@ -58,31 +59,73 @@ void foreign_feeds::erase_if(Condition concerns, bool tells) {
     std::erase_if(asked_, [&concerns](const auto& each) { return concerns(each.second); });
 }
 
-void foreign_feeds::end_at(std::string_view taker, const foreign_noun& noun) {
-    nats_.send_control({noun.pool, std::string{taker}},
-                       text_of(verb::bind, noun.node, noun.task, noun.parameters + " lease=0"));
+// All that is bound of the noun, or if it is still bound for other requesters, what these requests have bound.
+void foreign_feeds::end_at(std::string_view taker, const foreign_noun& noun, const std::deque<std::uint64_t>& numbers) {
+    foreign_noun first{noun.pool, noun.node, noun.task, noun.parameters};
+    const bridge_id at{noun.pool, std::string{taker}};
+    if (taker.empty()) {
+        return;
+    }
+    if (!has_key(bound_, first, noun_key)) {
+        nats_.send_control(at, text_of(verb::bind, noun.node, noun.task, noun.parameters + " lease=0"));
+        return;
+    }
+    first.requester = noun.requester;
+    if (!has_key(bound_, first, requester_key)) {
+        for (const auto number : numbers) {
+            nats_.send_cancel(at, number);
+        }
+    }
 }
 
-void foreign_feeds::on_answer(std::uint64_t id, bool is_failure, std::string_view taker) {
+void foreign_feeds::on_unbound(const bridge_id& by, std::uint64_t number) {
+    const auto found = std::ranges::find_if(bound_, [&](const auto& each) {
+        const auto& [noun, b] = each;
+        return noun.pool == by.pool && b.taker == by.instance && b.id == 0 && !b.numbers.empty() &&
+               b.numbers.back() == number;
+    });
+    if (found != bound_.end()) {
+        out_.lose_binding(found->first.on(), found->first.text(), "the publisher has ended the binding");
+        erase(found, false);
+    }
+}
+
+void foreign_feeds::on_answer(std::uint64_t id, std::uint64_t number, bool is_failure, std::string_view taker) {
     const auto asked = asked_.extract(id);
     if (asked.empty()) {
         return;
     }
     const auto found = bound_.find(asked.mapped());
-    const bool is_last = found != bound_.end() && found->second.id == id;
+    if (found == bound_.end()) {
+        if (!is_failure) { // the node has ended it meanwhile
+            end_at(taker, asked.mapped(), {number});
+        }
+        return;
+    }
+    auto& b = found->second;
+    const bool is_last = b.id == id;
     if (is_failure) {
         if (is_last) {
             erase(found, false);
         }
         return;
     }
-    if (found == bound_.end() && !taker.empty()) { // the node has ended it meanwhile
-        end_at(taker, asked.mapped());
+    if (b.taker != taker && !is_last && b.id == 0) { // another bridge has answered the last one
+        nats_.send_cancel({found->first.pool, std::string{taker}}, number);
+        return;
+    }
+    if (b.taker != taker) {
+        for (const auto each : std::exchange(b.numbers, {})) {
+            nats_.send_cancel({found->first.pool, b.taker}, each);
+        }
+        b.taker = taker;
+    }
+    b.numbers.push_back(number); // also if it is not the last: what it has bound is to be ended, too
+    if (b.numbers.size() > max_numbers) {
+        b.numbers.pop_front();
     }
     if (is_last) {
-        auto& b = found->second;
         b.id = 0;
-        b.taker = taker;
         for (auto& line : std::exchange(b.held, {})) {
             out_.deliver(found->first.on(), std::move(line));
         }

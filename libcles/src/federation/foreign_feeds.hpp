@@ -21,6 +21,7 @@ struct foreign_noun {
     std::string node;
     std::string task;
     std::string parameters{}; ///< "/fast", or empty
+    std::string requester{};  ///< the member for which it is bound; empty: this node
     std::string target{};     ///< the node as the binding names it: "car1" or "north.car1"
     std::uint32_t link = 0;   ///< the number of the link on which it is bound
 
@@ -42,8 +43,11 @@ class foreign_feeds {
     void bind(const foreign_noun& noun, std::uint64_t id);
     /// The node ends the binding.
     void unbind(const foreign_noun& noun);
-    /// The request was answered. \param taker the bridge that holds the binding; empty: not known
-    void on_answer(std::uint64_t id, bool is_failure, std::string_view taker);
+    /// The request was answered. \param number by which pools know it
+    /// \param taker the bridge that holds the binding; empty: not known
+    void on_answer(std::uint64_t id, std::uint64_t number, bool is_failure, std::string_view taker);
+    /// That bridge has ended what that request had bound: the publisher does not permit it any more.
+    void on_unbound(const bridge_id& by, std::uint64_t number);
     /// Nobody waits for the answer any more.
     void cancel(std::uint64_t id);
     void on_update(const subject& about, std::string_view message);
@@ -58,18 +62,20 @@ class foreign_feeds {
 
   private:
     static constexpr std::size_t max_held = 64;
+    static constexpr std::size_t max_numbers = 64; // as many as its bridge tells apart
     struct binding {
         std::uint64_t id = 0; ///< of the last request; 0: answered
         std::string taker{};
+        std::deque<std::uint64_t> numbers{}; ///< of the requests that this bridge has answered
         std::deque<std::string> held{};
     };
     using bindings = std::map<foreign_noun, binding>; // those of one subject are neighbours
 
-    /// \param tells whether its bridge is notified, unless the noun is bound there under another name
+    /// \param tells whether its bridge is notified, unless the noun is bound there for the same requester otherwise
     void erase(bindings::iterator which, bool tells);
     template <class Condition>
     void erase_if(Condition concerns, bool tells);
-    void end_at(std::string_view taker, const foreign_noun& noun);
+    void end_at(std::string_view taker, const foreign_noun& noun, const std::deque<std::uint64_t>& numbers);
 
     bridge_connection& nats_;
     bridge_output& out_;

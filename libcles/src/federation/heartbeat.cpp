@@ -36,8 +36,10 @@ struct heartbeat_members {
     std::optional<bool> starting{};
     std::optional<bool> closing{};
     std::optional<std::uint32_t> roster{};
+    std::optional<bool> sessions{};
 };
-BOOST_DESCRIBE_STRUCT(heartbeat_members, (), (node, interval_ms, names, replaces, leaving, starting, closing, roster))
+BOOST_DESCRIBE_STRUCT(heartbeat_members, (),
+                      (node, interval_ms, names, replaces, leaving, starting, closing, roster, sessions))
 
 template <class T>
 bool read_all(std::string_view text, T& read) {
@@ -56,7 +58,8 @@ std::string text_of(const heartbeat& said) {
                                      .leaving = flag(said.leaving),
                                      .starting = flag(said.starting),
                                      .closing = flag(said.closing),
-                                     .roster = said.roster == 0 ? std::nullopt : std::optional{said.roster}});
+                                     .roster = said.roster == 0 ? std::nullopt : std::optional{said.roster},
+                                     .sessions = flag(said.sessions)});
 }
 
 std::optional<heartbeat> parse_heartbeat(std::string_view text) {
@@ -75,7 +78,8 @@ std::optional<heartbeat> parse_heartbeat(std::string_view text) {
                      .leaving = read.leaving.value_or(false),
                      .starting = read.starting.value_or(false),
                      .closing = read.closing.value_or(false),
-                     .roster = read.roster.value_or(0)};
+                     .roster = read.roster.value_or(0),
+                     .sessions = read.sessions.value_or(false)};
 }
 
 node_names names_of(std::vector<std::string> nodes) {

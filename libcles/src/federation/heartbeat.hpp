@@ -22,6 +22,7 @@ struct heartbeat {
     bool starting = false;    ///< it knows nobody yet: others send theirs soon
     bool closing = false;     ///< it takes no more requests, and leaves when it has answered those that it has
     std::uint32_t roster = 0; ///< the version of its roster; 0: it has none
+    bool sessions = false;    ///< what it sends to one bridge is sealed under a session, if that one has them, too
 
     bool operator==(const heartbeat&) const = default;
 };

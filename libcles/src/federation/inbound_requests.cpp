@@ -159,7 +159,7 @@ void inbound_requests::bind(const protocol::request_line& r, const request& by, 
     }
     const auto publisher = pools_.publisher_of(nats_.pool(), noun_of(r));
     if (is_passed_on || publisher == nats_.self().instance || publisher.empty()) {
-        published_.bind(r, {by.by, by.reply});
+        published_.bind(r, {by.by, by.reply, requester_of(r, by)});
         return;
     }
     auto message = message_of(r, {});
@@ -168,6 +168,14 @@ void inbound_requests::bind(const protocol::request_line& r, const request& by, 
     }
     nats_.publish_short(control_subject({nats_.pool(), std::string{publisher}}),
                         text_of(verb::bind, r.noun.target, r.noun.task, message), by.reply);
+}
+
+// In a secured fleet, the bridge that asks, or the member for which it does.
+std::string inbound_requests::requester_of(const protocol::request_line& r, const request& by) const {
+    if (trust_ == nullptr) {
+        return {};
+    }
+    return r.from.empty() ? by.member : std::string{r.from};
 }
 
 bool inbound_requests::cancel(const bridge_id& by, std::uint64_t number) {

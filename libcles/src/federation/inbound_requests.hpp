@@ -72,6 +72,7 @@ class inbound_requests {
     using requests = std::unordered_map<std::uint64_t, request>;
 
     void bind(const protocol::request_line& r, const request& by, bool is_passed_on);
+    [[nodiscard]] std::string requester_of(const protocol::request_line& r, const request& by) const;
     void reply(const std::string& to, std::string_view rest, bool is_interim);
     void cancel(const requests::value_type& which);
     requests::node_type remove(requests::const_iterator which);

@@ -91,6 +91,7 @@ void outbound_requests::bind(const bridge_link& from, const protocol::request_li
                             .node = std::string{without_pool(r.noun.target, from.pool)},
                             .task = std::string{r.noun.task},
                             .parameters = std::string{r.noun.path.substr(r.noun.task.size())},
+                            .requester = std::string{r.from},
                             .target = std::string{r.noun.target},
                             .link = from.number};
     if (protocol::is_reserved_target(noun.node)) {
@@ -112,6 +113,7 @@ void outbound_requests::publish(const bridge_link& from, const protocol::request
     const auto made =
         sent_.emplace(number, request{.from = from,
                                       .id = r.id,
+                                      .number = number,
                                       .addressee = addressee,
                                       .sent_at = now,
                                       .forgotten_at = now + milliseconds{r.deadline_ms} + after_deadline});
@@ -179,8 +181,7 @@ void outbound_requests::cancel(requests::iterator which) {
 
 void outbound_requests::cancel_at_taker(requests::const_iterator which) {
     const auto& [number, r] = *which;
-    nats_.publish_short(control_subject({r.from.pool, r.taker}), cancel_line(number),
-                        reply_subject(nats_.self(), number));
+    nats_.send_cancel({r.from.pool, r.taker}, number);
 }
 
 // -- from other pools ----------------------------------------------------------------------------------------------
@@ -237,7 +238,7 @@ void outbound_requests::note_round_trip(const std::string& pool, time_point::dur
 void outbound_requests::answer(const request& answered, std::string_view reply) {
     if (!answered.is_cancelled) {
         out_.deliver(answered.from, reply_line(answered.id, reply));
-        feeds_.on_answer(answered.id, protocol::is_failure(reply), answered.taker);
+        feeds_.on_answer(answered.id, answered.number, protocol::is_failure(reply), answered.taker);
     }
 }
 

@@ -36,6 +36,8 @@ class outbound_requests {
     /// A reply that cannot be passed on: the request fails.
     void on_unusable_reply(const received_message& m, const protocol::failure& why);
     void on_update(const received_message& m) { feeds_.on_update(m.about, m.text); }
+    /// That bridge has ended what it had bound because of this bridge's request of that number.
+    void on_unbound(const bridge_id& by, std::uint64_t number) { feeds_.on_unbound(by, number); }
     void on_time(time_point now);
     /// What that bridge took, or was sent alone, is not answered any more.
     void on_lost(const bridge_id& gone, std::string_view why);
@@ -48,6 +50,7 @@ class outbound_requests {
     struct request {
         bridge_link from;
         std::uint64_t id = 0;
+        std::uint64_t number = 0;
         std::string addressee{}; ///< the bridge to which it was sent; empty: the one that NATS has selected
         time_point sent_at;
         time_point forgotten_at; ///< for lack of a reply

@@ -47,6 +47,7 @@ pool_table::arrival pool_table::on_heartbeat(const bridge_id& from, const heartb
         }
         found = pools_.emplace(from.pool, pool{}).first;
     }
+    found->second.has_left = false;
     auto& bridges = found->second.bridges;
     const auto known = bridges.find(from.instance);
     const bool fresh = known == bridges.end();
@@ -78,6 +79,18 @@ bool pool_table::make_room() {
         }
     }
     return oldest != pools_.end() && (pools_.erase(oldest), true);
+}
+
+void pool_table::note_leaving(const bridge_id& gone) {
+    const auto found = pools_.find(gone.pool);
+    if (found != pools_.end() && found->second.bridges.contains(gone.instance)) { // it may say so more than once
+        found->second.has_left = found->second.bridges.size() == 1;
+    }
+}
+
+bool pool_table::has_left(std::string_view name) const {
+    const auto found = pools_.find(name);
+    return found != pools_.end() && found->second.bridges.empty() && found->second.has_left;
 }
 
 bool pool_table::remove(const bridge_id& gone, time_point now) {
@@ -130,6 +143,7 @@ void pool_table::clear(time_point now) {
     for (auto& [name, p] : pools_) {
         p.without_bridges = p.bridges.empty() ? p.without_bridges : now;
         p.bridges.clear();
+        p.has_left = false; // it may return unheard
     }
     lost_.clear();
     bridge_count_ = 0;

@@ -40,6 +40,7 @@ class pool_table {
         /// that were received. The pool has all of these.
         std::map<std::string, std::vector<std::string>, std::less<>> names;
         time_point without_bridges; ///< since when, if there is none
+        bool has_left = false;      ///< its last bridge has said that it leaves
     };
     enum class arrival : std::uint8_t {
         known,
@@ -50,6 +51,8 @@ class pool_table {
 
     /// A bridge says that it lives.
     arrival on_heartbeat(const bridge_id& from, const heartbeat& said, time_point now);
+    /// A bridge that is about to be removed says that it leaves.
+    void note_leaving(const bridge_id& gone);
     /// Removes a bridge. Returns false if it is not known.
     bool remove(const bridge_id& gone, time_point now);
     using condition = std::function<bool(const std::string& instance, const bridge& which)>;
@@ -76,6 +79,8 @@ class pool_table {
     [[nodiscard]] bool is_known(std::string_view name) const { return pools_.contains(name); }
     [[nodiscard]] bool is_live(std::string_view name) const;
     [[nodiscard]] bool is_live(const bridge_id& which) const;
+    /// Whether it had bridges, and the last one has left in order: none is expected to return soon.
+    [[nodiscard]] bool has_left(std::string_view name) const;
     [[nodiscard]] std::size_t bridge_count() const noexcept { return bridge_count_; }
     /// The pool that has a node of this name, apart from `except`; live ones first. Empty if there is none.
     [[nodiscard]] std::string_view pool_of(std::string_view node, std::string_view except) const;

@@ -128,20 +128,20 @@ void federated_pools::accept(std::function<void(link_ptr)> on_link) {
     on_link_ = std::move(on_link);
     work_.emplace(executor_);
     timer_.emplace(executor_);
-    connection_ = std::make_unique<nats_connection>(server_options{.servers = options_.servers,
-                                                                   .name = "cles " + host_.lock()->node().name,
-                                                                   .credentials = options_.credentials,
-                                                                   .token = options_.token,
-                                                                   .tls_authority = options_.tls_authority,
-                                                                   .tls_certificate = options_.tls_certificate,
-                                                                   .tls_key = options_.tls_key},
-                                                    [executor = executor_, weak = weak_from_this()] {
-                                                        asio::post(executor, [weak] {
-                                                            if (const auto self = weak.lock()) {
-                                                                self->on_wake();
-                                                            }
-                                                        });
-                                                    });
+    connection_ = nats_connection::start(server_options{.servers = options_.servers,
+                                                        .name = "cles " + host_.lock()->node().name,
+                                                        .credentials = options_.credentials,
+                                                        .token = options_.token,
+                                                        .tls_authority = options_.tls_authority,
+                                                        .tls_certificate = options_.tls_certificate,
+                                                        .tls_key = options_.tls_key},
+                                         [executor = executor_, weak = weak_from_this()] {
+                                             asio::post(executor, [weak] {
+                                                 if (const auto self = weak.lock()) {
+                                                     self->on_wake();
+                                                 }
+                                             });
+                                         });
 }
 
 std::string federated_pools::address_of(std::string_view target) const {
@@ -176,13 +176,22 @@ void federated_pools::leave() {
     if (!std::exchange(leaving_, true) && connection_) {
         bridge_->leave(now());
         connection_->flush();
+        run_later(); // which sets the timer
     }
     stop_if_finished();
 }
 
+// Without a connection, no session begins.
+bool federated_pools::waits_for_session() {
+    return bridge_->is_connected() && channel_ && channel_->has_waiting(now());
+}
+
 // Nothing is posted to the executor after that.
 void federated_pools::stop_if_finished() {
-    if (leaving_ && links_.empty() && !std::exchange(stopped_, true)) {
+    const auto node = host_.lock();
+    const bool may_wait = node && !node->stopped() && connection_; // else the executor may end at once
+    const bool has_drained = !may_wait || (bridge_->has_drained() && events_.empty() && !waits_for_session());
+    if (leaving_ && links_.empty() && has_drained && !std::exchange(stopped_, true)) {
         if (connection_) {
             bridge_->say_left(now());
             connection_->flush();
@@ -195,6 +204,9 @@ void federated_pools::stop_if_finished() {
         dials_.clear();
         on_link_ = nullptr;
         work_.reset();
+        if (node) {
+            node->post_while_running([](core::local_node& host) { host.check_shutdown(); });
+        }
     }
 }
 
@@ -214,7 +226,7 @@ void federated_pools::serve_dials() {
     const auto at = now();
     for (auto next = dials_.begin(); next != dials_.end();) {
         const auto here = next++;
-        if (bridge_->is_live(here->pool) || here->until <= at) {
+        if (bridge_->is_live(here->pool) || bridge_->has_left(here->pool) || here->until <= at) {
             served.splice(served.end(), dials_, here);
         }
     }
@@ -228,7 +240,7 @@ void federated_pools::serve_dials() {
 }
 
 std::shared_ptr<pool_link> federated_pools::make_link(bridge_link which) {
-    // The nouns for other pools are bound in this node's name.
+    // The nouns for other pools are bound by this node, which states for whom.
     const bool is_own = which.what == bridge_link::role::publications && is_secured_;
     auto made = std::make_shared<pool_link>(std::shared_ptr<pool_link_owner>{shared_from_this(), this}, which,
                                             options_.pool, is_own ? host_.lock()->node().name : which.member);
@@ -287,6 +299,10 @@ void federated_pools::run() {
     }
     connection_->flush();
     take_events();
+    stop_if_finished();
+    if (stopped_) {
+        return;
+    }
     if (!events_.empty() || !ready_.empty() || !refused_.empty()) {
         run_later();
     }
@@ -411,6 +427,9 @@ void federated_pools::on_message(const event& e) {
         channel_->receive(received, *bridge_);
     }
     if (channel_) { // a link that was refused may have been the last one
+        for (auto& each : channel_->take_ready(received.at)) {
+            connection_->publish(std::move(each.subject), std::move(each.reply), std::move(each.message));
+        }
         publish_questions();
     }
 }
@@ -433,10 +452,18 @@ bool federated_pools::publish(std::string subject, std::string reply, std::strin
         return false;
     }
     if (is_secured_) {
-        message = channel_ ? channel_->seal(subject, reply, message) : std::string{};
-        if (message.empty()) { // this node is no member
+        if (!channel_) {
             return false;
         }
+        auto sealed = channel_->seal(subject, reply, message, now());
+        if (sealed.waits) { // for a session, which is asked for
+            publish_questions();
+            return true;
+        }
+        if (sealed.bytes.empty()) { // this node is no member, or too much waits
+            return false;
+        }
+        message = std::move(sealed.bytes);
     }
     return connection_->publish(std::move(subject), std::move(reply), std::move(message));
 }
@@ -518,6 +545,10 @@ void federated_pools::lose_if(Condition concerns, std::string_view why) {
     }
 }
 
+void federated_pools::end(const bridge_link& which) {
+    lose_if([&which](const bridge_link& l) { return l == which; }, "nothing is bound on it any more");
+}
+
 void federated_pools::lose_pool(std::string_view pool, std::string_view why) {
     lose_if([pool](const bridge_link& l) { return l.what != bridge_link::role::publications && l.pool == pool; }, why);
 }
@@ -592,6 +623,12 @@ void federated_pools::on_lost(const bridging::bridge_id& gone) {
 void federated_pools::on_stated_roster(const bridging::bridge_id& by, std::uint32_t version) {
     if (channel_) {
         channel_->on_stated_roster(by, version, now());
+    }
+}
+
+void federated_pools::on_stated_sessions(const bridging::bridge_id& by) {
+    if (channel_) {
+        channel_->on_stated_sessions(by, now());
     }
 }
 

@@ -60,6 +60,7 @@ class federated_pools final : public core::other_pools,
     [[nodiscard]] std::string address_of(std::string_view target) const override;
     [[nodiscard]] std::vector<known_pool> list() const override;
     void on_security_changed() override;
+    [[nodiscard]] bool has_left() const override { return stopped_; }
 
     // For the transport.
     void listen(const boost::asio::any_io_executor& executor, const limits& bounds);
@@ -80,6 +81,7 @@ class federated_pools final : public core::other_pools,
     void subscribe(std::string subject, bool shared) override;
     void unsubscribe(const std::string& subject) override;
     void deliver(const bridging::bridge_link& on, std::string line) override;
+    void end(const bridging::bridge_link& which) override;
     void lose_pool(std::string_view pool, std::string_view why) override;
     void lose_all(std::string_view why) override;
     void lose_binding(const bridging::bridge_link& on, const std::string& noun, std::string_view why) override;
@@ -95,6 +97,7 @@ class federated_pools final : public core::other_pools,
     [[nodiscard]] std::uint32_t roster_version() const override;
     void on_lost(const bridging::bridge_id& gone) override;
     void on_stated_roster(const bridging::bridge_id& by, std::uint32_t version) override;
+    void on_stated_sessions(const bridging::bridge_id& by) override;
 
     // pool_link_owner
     void on_line(const bridging::bridge_link& from, std::string_view line) override;
@@ -110,6 +113,7 @@ class federated_pools final : public core::other_pools,
     void on_connected(const event& e);
     void on_message(const event& e);
     void publish_questions();
+    [[nodiscard]] bool waits_for_session();
     void run_later();
     void flush();
     void run();
@@ -134,7 +138,7 @@ class federated_pools final : public core::other_pools,
     std::optional<bridging::bridge> bridge_;
     std::optional<bridging::sealed_channel> channel_; // in a secured fleet, of the last connection
     std::uint64_t connected_as_ = 0;                  // the instance on that
-    std::unique_ptr<nats_connection> connection_;
+    nats_connection::handle connection_;
     std::optional<boost::asio::steady_timer> timer_;
     time_point timer_due_ = time_point::max();
     std::function<void(link_ptr)> on_link_;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "nats/nats_connection.hpp"
 
+#include <cles/error.hpp>
+
 #include <boost/system/error_code.hpp>
 #include <boost/system/system_error.hpp>
 
@@ -30,6 +32,7 @@ constexpr int max_pings_out = 2;
 constexpr milliseconds first_pause{250};
 constexpr milliseconds longest_pause{1'000};
 constexpr milliseconds flush_at_end{200};
+constexpr milliseconds drain_timeout{500};
 constexpr int most_buffered = 1 << 20; // bytes that the library holds; more wait here
 
 // What the library may call after its connection has been destroyed here.
@@ -173,14 +176,29 @@ struct nats_connection::callbacks {
 };
 
 nats_connection::nats_connection(server_options options, std::function<void()> wake)
-    : options_(std::move(options)), number_(enter(this)), wake_descriptor_(make_descriptor()), wake_(std::move(wake)),
-      tls_(connect_timeout), thread_([this] { run(); }) {}
+    : options_(std::move(options)), wake_descriptor_(make_descriptor()), number_(enter(this)), wake_(std::move(wake)),
+      tls_(connect_timeout) {}
 
 nats_connection::~nats_connection() {
-    stop();
-    thread_.join();
     leave(number_);
     ::close(wake_descriptor_);
+}
+
+nats_connection::handle nats_connection::start(server_options options, std::function<void()> wake) {
+    tls_watch::keep_openssl();
+    const std::shared_ptr<nats_connection> made{new nats_connection{std::move(options), std::move(wake)}};
+    try {
+        std::thread{[made] { made->run(); }}.detach();
+    } catch (const std::system_error& e) {
+        throw error(e.code(), "cannot start the thread that is connected to NATS: " + e.code().message());
+    }
+    return handle{made.get(), ending{made}};
+}
+
+void nats_connection::end() {
+    stop();
+    std::unique_lock lock{mutex_};
+    changed_.wait(lock, [this] { return has_ended_ || is_connecting_; });
 }
 
 // -- on the executor -----------------------------------------------------------------------------------------------
@@ -274,8 +292,16 @@ void nats_connection::put_bulk(event e) {
 void nats_connection::run() {
     own_thread_ = std::this_thread::get_id();
     auto next_pause = first_pause;
+    const auto note = [this](bool& what, bool value) {
+        const std::lock_guard lock{mutex_};
+        what = value;
+        changed_.notify_all();
+    };
     while (!stopped_) {
-        if (auto why = connect(); !why.empty()) {
+        note(is_connecting_, true);
+        auto why = connect();
+        note(is_connecting_, false);
+        if (!why.empty()) {
             put({.what = event::kind::refused, .text = std::move(why)});
         } else {
             next_pause = first_pause;
@@ -289,6 +315,7 @@ void nats_connection::run() {
         next_pause = std::min(next_pause * 2, longest_pause);
     }
     nats_ReleaseThreadMemory();
+    note(has_ended_, true);
 }
 
 void nats_connection::pause(milliseconds time) {
@@ -514,13 +541,7 @@ void nats_connection::apply(const command& c) {
     case command::kind::subscribe_bulk:
         code = natsConnection_Subscribe(&made, connection_, c.subject.c_str(), &callbacks::bulk, self);
         break;
-    case command::kind::unsubscribe:
-        if (const auto found = subscriptions_.find(c.subject); found != subscriptions_.end()) {
-            std::erase(polled_, found->second);
-            natsSubscription_Destroy(found->second);
-            subscriptions_.erase(found);
-        }
-        break;
+    case command::kind::unsubscribe: unsubscribe_now(c.subject); break;
     }
     if (made != nullptr && code == NATS_OK) {
         auto& kept = subscriptions_[c.subject];
@@ -531,14 +552,42 @@ void nats_connection::apply(const command& c) {
     }
 }
 
+void nats_connection::unsubscribe_now(const std::string& subject) {
+    const auto found = subscriptions_.extract(subject);
+    if (found.empty()) {
+        return;
+    }
+    auto* const gone = found.mapped();
+    if (std::ranges::find(polled_, gone) != polled_.end()) {
+        if (natsSubscription_DrainTimeout(gone, drain_timeout.count()) == NATS_OK) {
+            draining_.push_back(gone);
+            return;
+        }
+        collect(); // what has arrived
+        std::erase(polled_, gone);
+    }
+    natsSubscription_Destroy(gone);
+}
+
+// At once, so that who takes one message takes all that were read with it.
 void nats_connection::collect() {
+    std::vector<event> read;
     for (auto* const each : polled_) {
+        if (!natsSubscription_IsValid(each)) { // it has been drained
+            continue;
+        }
         int left = 0; // to ask for one more would have the library describe an error
         int bytes = 0;
         natsMsg* message = nullptr;
         natsSubscription_GetPending(each, &left, &bytes);
         for (; left > 0 && natsSubscription_NextMsg(&message, each, 0) == NATS_OK; --left) {
-            put(message_of(message));
+            read.push_back(message_of(message));
+        }
+    }
+    if (!read.empty()) {
+        const std::lock_guard lock{mutex_};
+        for (auto& each : read) {
+            put_locked(std::move(each));
         }
     }
 }
@@ -558,6 +607,9 @@ void nats_connection::send_rest() {
 void nats_connection::disconnect() {
     for (const auto& [subject, subscription] : std::exchange(subscriptions_, {})) {
         natsSubscription_Destroy(subscription);
+    }
+    for (auto* const each : std::exchange(draining_, {})) {
+        natsSubscription_Destroy(each);
     }
     polled_.clear();
     natsConnection_Destroy(std::exchange(connection_, nullptr));

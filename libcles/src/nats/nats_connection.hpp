@@ -5,10 +5,12 @@
 
 #include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <string_view>
@@ -53,15 +55,22 @@ struct event {
 /// pauses. Each connection begins without subscriptions, and what was meant for an earlier one is dropped: nothing is
 /// sent twice.
 ///
-/// Its functions are called on one thread, the executor's, and do not block; the destructor waits for the thread, at
-/// most for an attempt to connect.
+/// Its functions are called on one thread, the executor's, and do not block. The end of the handle waits until what was
+/// published has been sent, but not for an attempt to connect, which may take as long as the system's resolver: then
+/// the thread ends later, on its own.
 class nats_connection {
   public:
     static constexpr std::size_t max_unsent = 4U << 20U;
     static constexpr std::size_t max_untaken = 4U << 20U;
 
+    struct ending {
+        std::shared_ptr<nats_connection> shared; // with the thread
+        void operator()(nats_connection* which) const { which->end(); }
+    };
+    using handle = std::unique_ptr<nats_connection, ending>;
     /// \param wake called on another thread when there are events, until `stop`
-    nats_connection(server_options options, std::function<void()> wake);
+    /// \throws cles::error if the system refuses a descriptor or the thread
+    static handle start(server_options options, std::function<void()> wake);
     nats_connection(const nats_connection&) = delete;
     nats_connection& operator=(const nats_connection&) = delete;
     ~nats_connection();
@@ -74,6 +83,7 @@ class nats_connection {
     bool publish(std::string subject, std::string reply, std::string text);
     /// \param group the queue group; empty: none \param bulk messages that may be dropped if too many wait to be taken
     void subscribe(std::string subject, std::string group, bool bulk);
+    /// Messages of a subscription that is not bulk still arrive if the server has sent them before it knows.
     void unsubscribe(std::string subject);
     /// Has the thread send what was published.
     void flush();
@@ -102,12 +112,15 @@ class nats_connection {
     struct callbacks;
     friend struct callbacks;
 
+    nats_connection(server_options options, std::function<void()> wake);
+    void end();
     void run();
     std::string connect();
     std::string configure(__natsOptions* made);
     std::string serve();
     bool apply_commands();
     void apply(const command& c);
+    void unsubscribe_now(const std::string& subject);
     void collect();
     void put(event e);
     void put_bulk(event e);
@@ -121,8 +134,8 @@ class nats_connection {
     [[nodiscard]] bool takes_more() const;
 
     const server_options options_;
+    const int wake_descriptor_;
     const std::uintptr_t number_; // in the registry of those that the library may call
-    int wake_descriptor_;
 
     // Of the executor.
     std::uint64_t given_ = 0;
@@ -135,6 +148,9 @@ class nats_connection {
     std::size_t untaken_ = 0;
     bool waking_ = false;
     bool is_full_ = false;
+    bool is_connecting_ = false;
+    bool has_ended_ = false;
+    std::condition_variable changed_; // the last two
 
     std::atomic<std::size_t> queued_{0};
     std::atomic<std::size_t> buffered_{0};
@@ -152,8 +168,7 @@ class nats_connection {
     tls_watch tls_;
     std::map<std::string, __natsSubscription*, std::less<>> subscriptions_;
     std::vector<__natsSubscription*> polled_;
-
-    std::thread thread_; // last: it uses all of the above
+    std::vector<__natsSubscription*> draining_; // of these, those that have been ended
 };
 
 } // namespace cles::nats

@@ -33,6 +33,16 @@ class message_seal {
     [[nodiscard]] virtual std::string seal(std::string_view subject, std::string_view reply,
                                            std::string_view message) = 0;
 
+    struct sealed_message {
+        std::string bytes{};     ///< empty: it waits, or cannot be sealed, as of `seal`
+        bool in_session = false; ///< else it is signed
+        bool waits = false;      ///< for the session, which begins: try again after questions were received
+    };
+    /// A message for one bridge. If that one has sessions, it is sealed under the session with it, and never in another
+    /// way.
+    [[nodiscard]] virtual sealed_message seal_for(std::uint64_t to, std::string_view subject, std::string_view reply,
+                                                  std::string_view message, time_point now) = 0;
+
     enum class verdict : std::uint8_t {
         refused,  ///< not sealed, altered, repeated, of a generation that is not accepted, or not of a member
         unproven, ///< authentic, but perhaps an old one: its sender is asked whether it is alive. It never counts
@@ -50,16 +60,21 @@ class message_seal {
         std::optional<std::uint64_t> instance{}; ///< nothing: not stated
         std::string_view questions{};            ///< its subject for questions; empty: not stated
         bool is_update = false;                  ///< updates and other messages may overtake each other, by any number
+        bool is_for_one = false; ///< a request, reply or control line: of a bridge that has sessions, it
+                                 ///< counts under a session only. No other message counts under one
     };
     /// What was received on that subject. It is refused if it is not of the instance that is stated.
     [[nodiscard]] virtual opened_message open(std::string_view subject, std::string_view reply, const origin& from,
                                               std::string_view bytes, time_point now) = 0;
-    /// That bridge is lost: its messages do not count until it has proved again that it is alive.
+    /// That bridge is lost: its messages do not count until it has proved again that it is alive, and sessions with it
+    /// end.
     virtual void forget(std::uint64_t instance) = 0;
     /// A bridge has stated this version of its roster, in a message that was opened.
     virtual void on_stated_roster(const origin& by, std::uint32_t version, time_point now) = 0;
+    /// A bridge has stated that it has sessions, in a message that was opened. That holds until its connection ends.
+    virtual void on_stated_sessions(const origin& by, time_point now) = 0;
 
-    /// A message of the bridges' seals to each other: whether a sender is alive, and the roster.
+    /// A message of the bridges' seals to each other: whether a sender is alive, sessions, and the roster.
     struct question {
         std::string subject;
         std::string message;

@@ -12,6 +12,8 @@
 //     a  what was sent before arrives (first byte: which), with a byte changed (2 bytes: where, and how)
 //     b  the next roster comes into force at car2: rotated, without car3, with car3 as a new member
 //     c  car2 states a version of its roster (1 byte)
+//     d  both state that they have sessions
+//     e  car2 sends a message for car1 alone, under a session if there is one
 //
 // For every input: car1 opens no message that car2 has not sealed for that subject, none twice, and none that is older
 // than its question whether car2 is alive; no forged question counts; its roster never becomes an older one; after a
@@ -80,9 +82,12 @@ struct carried {
     std::string reply;
     std::uint64_t instance = 0;
     std::string bytes;
-    std::size_t order = 0; // of sealing
+    std::size_t order = 0;   // of sealing
+    bool is_for_one = false; // for car1 alone
 
-    [[nodiscard]] core::message_seal::origin from() const { return {.instance = instance, .questions = reply}; }
+    [[nodiscard]] core::message_seal::origin from() const {
+        return {.instance = instance, .questions = reply, .is_for_one = is_for_one};
+    }
     [[nodiscard]] bool is(const carried& other) const {
         return subject == other.subject && reply == other.reply && bytes == other.bytes;
     }
@@ -135,6 +140,8 @@ class network {
         case 12:
             car1_->messages.on_stated_roster({.instance = instance(0), .questions = car2_->questions}, first, now_);
             break;
+        case 13: state_sessions(); break;
+        case 14: send_in_session(argument); break;
         default: break;
         }
         require(car1_fleet_.in_force().version() >= version, "a roster is never replaced by an older one");
@@ -207,6 +214,25 @@ class network {
         require(result.what != verdict::refused ||
                     car1_fleet_.in_force().generation() < car2_fleet_.in_force().oldest(),
                 "an honest message is not refused", result.why);
+    }
+    void state_sessions() {
+        car1_->messages.on_stated_sessions({.instance = car2_->messages.instance(), .questions = car2_->questions},
+                                           now_);
+        car2_->messages.on_stated_sessions({.instance = car1_->messages.instance(), .questions = car1_->questions},
+                                           now_);
+    }
+    void send_in_session(std::string_view text) {
+        carried made{.subject = "x", .reply = car2_->questions, .instance = car2_->messages.instance()};
+        auto sealed = car2_->messages.seal_for(car1_->messages.instance(), made.subject, made.reply, text, now_);
+        if (sealed.bytes.empty()) {
+            require(sealed.waits, "a message is sealed, or waits");
+            return;
+        }
+        made.bytes = std::move(sealed.bytes);
+        made.order = ++order_;
+        made.is_for_one = true;
+        history_.push_back(made);
+        receive(made);
     }
     std::vector<carried> take(bridge& by) {
         std::vector<carried> taken;

@@ -15,6 +15,9 @@
 //   instance
 //   seal_message SUBJECT REPLY TEXT
 //   open_message SUBJECT REPLY INSTANCE QUESTIONS MESSAGE
+//   able INSTANCE QUESTIONS                                 that bridge has sessions
+//   seal_for INSTANCE SUBJECT REPLY TEXT                    a message for that bridge
+//   open_for SUBJECT REPLY INSTANCE QUESTIONS MESSAGE       one for this bridge
 //   question SUBJECT INSTANCE QUESTIONS MESSAGE
 //   stated INSTANCE QUESTIONS VERSION
 #include "protocol/request_line.hpp"
@@ -117,13 +120,23 @@ class node final : public datagram_sink {
             std::string text;
             std::getline(words, text);
             std::cout << "sealed " << to_hex(as_bytes(messages_.seal(subject, reply, text))) << "\n";
-        } else if (command == "open_message") {
+        } else if (command == "seal_for") {
+            const auto addressee = std::stoull(next());
+            const auto subject = next();
+            const auto reply = next();
+            words >> std::ws;
+            std::string text;
+            std::getline(words, text);
+            const auto sealed = messages_.seal_for(addressee, subject, reply, text, now_);
+            std::cout << (sealed.waits ? "waits" : "sealed " + to_hex(as_bytes(sealed.bytes))) << "\n";
+        } else if (command == "open_message" || command == "open_for") {
             const auto subject = next();
             const auto reply = next();
             const auto instance = std::stoull(next());
             const auto questions = next();
-            const auto result = messages_.open(subject, reply, {.instance = instance, .questions = questions},
-                                               as_text(from_hex(next())), now_);
+            const auto result = messages_.open(
+                subject, reply, {.instance = instance, .questions = questions, .is_for_one = command == "open_for"},
+                as_text(from_hex(next())), now_);
             constexpr std::array names{"refused", "unproven", "opened"};
             std::cout << names.at(static_cast<std::size_t>(result.what)) << " " << result.sender << " "
                       << result.message << "\n";
@@ -135,6 +148,10 @@ class node final : public datagram_sink {
                                       as_text(from_hex(next())), now_)) {
                 std::cout << "heartbeat\n";
             }
+        } else if (command == "able") {
+            const auto instance = std::stoull(next());
+            const auto questions = next();
+            messages_.on_stated_sessions({.instance = instance, .questions = questions}, now_);
         } else if (command == "stated") {
             const auto instance = std::stoull(next());
             const auto questions = next();

@@ -24,6 +24,9 @@ class other_pools {
     [[nodiscard]] virtual std::string address_of(std::string_view target) const = 0;
     /// The roster or the rights have changed, in a secured fleet.
     virtual void on_security_changed() = 0;
+    /// Once the node has stopped listening: whether what others have sent has been answered. Then it calls
+    /// `local_node::check_shutdown`.
+    [[nodiscard]] virtual bool has_left() const = 0;
 
     struct known_pool {
         std::string name;

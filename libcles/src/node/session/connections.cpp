@@ -4,6 +4,7 @@
 #include "node/base/scoped_flag.hpp"
 #include "node/local_node.hpp"
 #include "node/membership/reachable_endpoints.hpp"
+#include "node/routing/other_pools.hpp"
 #include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
 
@@ -231,7 +232,8 @@ void graceful_shutdown::end_links() {
             c->flush();
         }
     }
-    if (!open) {
+    const auto* const pools = host_.node().pools;
+    if (!open && (pools == nullptr || pools->has_left())) {
         end();
     }
 }

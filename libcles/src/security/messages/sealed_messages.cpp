@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/messages/sealed_messages.hpp"
 
+#include "protocol/hex_number.hpp"
 #include "security/keys/bytes.hpp"
 #include "security/keys/keys.hpp"
 #include "security/keys/signed_text.hpp"
@@ -27,8 +28,12 @@ constexpr std::size_t ask_bytes = question_head_bytes + 4;
 constexpr std::size_t max_roster_bytes = question_head_bytes + sealed_overhead + max_roster_line;
 constexpr std::string_view ask_word = "ask ";
 constexpr std::string_view live_word = "live ";
+constexpr std::string_view hello_word = "hello ";
+constexpr std::string_view welcome_word = "welcome ";
+constexpr std::string_view unknown_word = "unknown ";
 
 static_assert(core::message_seal::overhead == message_at + seal_bytes);
+static_assert(core::message_seal::overhead >= bridge_sessions::overhead);
 
 std::uint8_t* writable(std::string& text) { return reinterpret_cast<std::uint8_t*>(text.data()); }
 
@@ -55,7 +60,8 @@ core::message_seal::opened_message refused_because(std::string_view why) { retur
 } // namespace
 
 sealed_messages::sealed_messages(fleet& of, entropy& random, roster_sink take_roster, std::uint64_t first_counter)
-    : fleet_(of), random_(random), take_roster_(std::move(take_roster)), counter_(first_counter), salts_(of) {
+    : fleet_(of), random_(random), take_roster_(std::move(take_roster)), counter_(first_counter), salts_(of),
+      sessions_(of, random) {
     random_.fill(salt_);
     if (const auto* const self = fleet_.self()) {
         salts_.learn(self->number, salt_, 0, first_counter); // NATS delivers what a bridge sends to itself, too
@@ -101,6 +107,22 @@ std::string sealed_messages::seal(std::string_view subject, std::string_view rep
                                                signature_bytes + message.size(), additional.data(), additional.size(),
                                                nullptr, to + group_nonce_at, key->data());
     return sealed;
+}
+
+sealed_messages::sealed_message sealed_messages::seal_for(std::uint64_t to, std::string_view subject,
+                                                          std::string_view reply, std::string_view message,
+                                                          time_point now) {
+    const auto own = instance();
+    if (to == own || !sessions_.is_able(to)) {
+        return {.bytes = seal(subject, reply, message)};
+    }
+    if (!may_send() || !is_one_line(subject) || !is_one_line(reply)) {
+        return {};
+    }
+    send_hello(to, sessions_.hello_if_due(own, to, now));
+    auto sealed = sessions_.seal(own, to, subject, reply, message, now);
+    const bool waits = sealed.empty();
+    return {.bytes = std::move(sealed), .in_session = !waits, .waits = waits};
 }
 
 // -- opening -------------------------------------------------------------------------------------------------------
@@ -167,7 +189,14 @@ sealed_messages::opened_message sealed_messages::unseal(std::string_view subject
 
 sealed_messages::opened_message sealed_messages::open(std::string_view subject, std::string_view reply,
                                                       const origin& from, std::string_view bytes, time_point now) {
+    if (!bytes.empty() && as_bytes(bytes)[0] == bridge_sessions::message_kind) {
+        return open_in_session(subject, reply, from, as_bytes(bytes), now);
+    }
     const auto opened = unseal(subject, reply, from, bytes, now);
+    if (from.is_for_one && opened.what != verdict::refused && opened.instance != instance() &&
+        sessions_.is_able(opened.instance)) { // nobody can make two bridges do without their sessions
+        return refused_because("it is signed, and its sender has sessions");
+    }
     if (opened.what != verdict::unproven) {
         return opened;
     }
@@ -179,11 +208,43 @@ sealed_messages::opened_message sealed_messages::open(std::string_view subject, 
     return challenges_.change_open(about, now, note) ? opened : refused_because("its sender may not be alive any more");
 }
 
+sealed_messages::opened_message sealed_messages::open_in_session(std::string_view subject, std::string_view reply,
+                                                                 const origin& from, bytes_view sealed,
+                                                                 time_point now) {
+    const auto head = bridge_sessions::read_head(sealed);
+    if (!head || !from.is_for_one) {
+        return refused_because("it is not sealed");
+    }
+    if (fleet_.self() == nullptr) {
+        return refused_because("this node is not in the roster");
+    }
+    if (from.instance && *from.instance != head->instance) {
+        return refused_because("it is not of the bridge that its subjects state");
+    }
+    const auto* const sender = fleet_.in_force().find(static_cast<std::uint32_t>(head->instance >> 40U));
+    if (sender == nullptr) {
+        return refused_because("its sender is not in the roster");
+    }
+    if (!is_one_line(subject) || !is_one_line(reply)) {
+        return refused_because("its subject contains a line end");
+    }
+    switch (sessions_.open(*head, subject, reply, sealed, opened_, now)) {
+    case bridge_sessions::verdict::opened: break;
+    case bridge_sessions::verdict::refused:
+        return refused_because("it was altered or repeated, or is too late, or of another subject");
+    case bridge_sessions::verdict::unknown:
+        tell_unknown_session(*head, now);
+        return refused_because("it is sealed under a session that is not known here");
+    }
+    return {.what = verdict::opened, .sender = sender->name, .instance = head->instance, .message = as_text(opened_)};
+}
+
 void sealed_messages::forget(std::uint64_t instance) {
     std::array<std::uint8_t, 8> bytes{};
     store_big<8>(instance, bytes.data());
     const auto member = static_cast<std::uint32_t>(instance >> 40U);
     salts_.forget(member, std::span{bytes}.subspan(3));
+    sessions_.end_sessions(instance);
     challenges_.end_if([&](const salt_of_member& about) {
         return about.first == member && instance_of(member, about.second) == instance;
     });
@@ -219,6 +280,54 @@ void sealed_messages::ask_for_roster(const origin& who, roster_questions& reason
 void sealed_messages::on_stated_roster(const origin& by, std::uint32_t version, time_point now) {
     if (version > fleet_.in_force().version()) {
         ask_for_roster(by, for_stated_, now);
+    }
+}
+
+void sealed_messages::on_stated_sessions(const origin& by, time_point now) {
+    if (by.instance && !by.questions.empty() && *by.instance != instance()) {
+        sessions_.note_able(*by.instance, by.questions, now);
+        send_hello(*by.instance, sessions_.hello_if_due(instance(), *by.instance, now));
+    }
+}
+
+void sealed_messages::send_hello(std::uint64_t to, std::string text) {
+    if (!text.empty()) {
+        keep(sessions_.questions_of(to), own_text{std::string{hello_word}.append(text)});
+    }
+}
+
+void sealed_messages::begin_session_again(std::uint64_t with, time_point now) {
+    send_hello(with, sessions_.begin_again(instance(), with, now));
+}
+
+// Anybody can send a message that causes this, so it is signed, and concerns that session only.
+void sealed_messages::tell_unknown_session(const session_head& head, time_point now) {
+    if (sessions_.is_able(head.instance) && unknown_sessions_.take_turn(head.instance, now)) {
+        keep(sessions_.questions_of(head.instance),
+             own_text{std::string{unknown_word}.append(protocol::hex_text(head.index))});
+        unknown_sessions_.note(head.instance, {}, now);
+    }
+}
+
+// Of a bridge that is proved to be alive.
+void sealed_messages::on_session_question(const origin& from, std::uint64_t sender, std::string_view words,
+                                          time_point now) {
+    if (from.questions.empty() || sender == instance()) {
+        return;
+    }
+    if (words.starts_with(hello_word)) {
+        sessions_.note_able(sender, from.questions, now);
+        if (auto answer = sessions_.take_hello(instance(), sender, words.substr(hello_word.size()), now);
+            !answer.empty()) {
+            keep(from.questions, own_text{std::string{welcome_word}.append(answer)});
+        }
+    } else if (words.starts_with(welcome_word)) {
+        sessions_.take_welcome(sender, words.substr(welcome_word.size()));
+    } else if (words.starts_with(unknown_word)) {
+        if (const auto index = protocol::parse_hex<std::uint64_t>(words.substr(unknown_word.size()))) {
+            sessions_.end_unknown(sender, *index);
+            send_hello(sender, sessions_.hello_if_due(instance(), sender, now));
+        }
     }
 }
 
@@ -283,6 +392,7 @@ bool sealed_messages::on_sealed_question(std::string_view subject, const origin&
         const auto is_this = [text = words.substr(live_word.size())](const challenge& c) { return c.text == text; };
         if (const auto answered = challenges_.take(about, now, is_this)) {
             salts_.learn(head.sender, head.salt, 0, std::max(head.counter, answered->highest) + 1);
+            begin_session_again(opened.instance, now); // WELCOME may have come before, and then did not count
             return true;
         }
     }
@@ -291,9 +401,14 @@ bool sealed_messages::on_sealed_question(std::string_view subject, const origin&
         words.starts_with(ask_word) && is_challenge(words.substr(ask_word.size())) && !from.questions.empty();
     if (is_asked && proofs_.take(now)) {
         keep(from.questions, own_text{std::string{live_word}.append(words.substr(ask_word.size()))});
+        if (opened.what == verdict::opened) { // it does not know this bridge any more, so it has no session of it
+            begin_session_again(opened.instance, now); // after the proof, without which HELLO has no effect
+        }
     }
     if (opened.what == verdict::unproven) {
         ask_whether_alive(from, about, now);
+    } else {
+        on_session_question(from, opened.instance, words, now);
     }
     return is_asked;
 }

@@ -9,6 +9,7 @@
 #include "security/datagrams/salt_table.hpp"
 #include "security/fleet/fleet.hpp"
 #include "security/messages/asked_questions.hpp"
+#include "security/messages/bridge_sessions.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -37,10 +38,13 @@ class sealed_messages final : public core::message_seal {
 
     [[nodiscard]] std::uint64_t instance() const override;
     [[nodiscard]] std::string seal(std::string_view subject, std::string_view reply, std::string_view message) override;
+    [[nodiscard]] sealed_message seal_for(std::uint64_t to, std::string_view subject, std::string_view reply,
+                                          std::string_view message, time_point now) override;
     [[nodiscard]] opened_message open(std::string_view subject, std::string_view reply, const origin& from,
                                       std::string_view bytes, time_point now) override;
     void forget(std::uint64_t instance) override;
     void on_stated_roster(const origin& by, std::uint32_t version, time_point now) override;
+    void on_stated_sessions(const origin& by, time_point now) override;
     [[nodiscard]] std::vector<question> take_questions(std::string_view questions) override;
     [[nodiscard]] bool on_question(std::string_view subject, const origin& from, std::string_view bytes,
                                    time_point now) override;
@@ -72,6 +76,12 @@ class sealed_messages final : public core::message_seal {
                     std::string_view message);
     [[nodiscard]] opened_message unseal(std::string_view subject, std::string_view reply, const origin& from,
                                         std::string_view bytes, time_point now);
+    [[nodiscard]] opened_message open_in_session(std::string_view subject, std::string_view reply, const origin& from,
+                                                 bytes_view sealed, time_point now);
+    void tell_unknown_session(const session_head& head, time_point now);
+    void send_hello(std::uint64_t to, std::string text);
+    void begin_session_again(std::uint64_t with, time_point now);
+    void on_session_question(const origin& from, std::uint64_t sender, std::string_view words, time_point now);
     void ask_whether_alive(const origin& who, const salt_of_member& about, time_point now);
     [[nodiscard]] bool on_sealed_question(std::string_view subject, const origin& from, std::string_view bytes,
                                           time_point now);
@@ -95,6 +105,8 @@ class sealed_messages final : public core::message_seal {
     roster_questions for_stated_{200};
     roster_questions for_unopened_{50};
     asked_questions<std::uint32_t, std::monostate> roster_answers_{10}; // to a member
+    bridge_sessions sessions_;
+    asked_questions<std::uint64_t, std::monostate> unknown_sessions_{50}; // that an instance was told of
     rate_limit boxes_{50};
     rate_limit proofs_{1'000};
     std::deque<pending> pending_;

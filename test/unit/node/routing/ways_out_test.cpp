@@ -22,6 +22,7 @@ class one_pool final : public cles::core::other_pools {
     void start(cles::core::local_node&) override {}
     [[nodiscard]] std::string address_of(std::string_view) const override { return {}; }
     void on_security_changed() override {}
+    [[nodiscard]] bool has_left() const override { return true; }
     [[nodiscard]] std::vector<known_pool> list() const override { return {{"north"}}; }
 };
 
