@@ -70,6 +70,7 @@ namespace detail {
 /// than an object would.
 using service_part = std::function<void(asio_port::asio_environment&, core::node_options&)>;
 struct tracing_part;
+struct types_part;
 } // namespace detail
 
 /// URLs of nodes, by name. A std::map that the library copies, assigns and destroys, so that a user's file compiles
@@ -122,6 +123,9 @@ struct service_options {
     /// `cles::tracing()` records how long traced requests take here (<cles/tracing.hpp>). If null, the identity of a
     /// trace is only passed on.
     const detail::tracing_part* tracing = nullptr;
+    /// `cles::types()` tells others the types of the node's tasks, and its nouns (<cles/types.hpp>). If null, requests
+    /// for them fail with `no_task`.
+    const detail::types_part* types = nullptr;
     /// Returns the load of this node, which is reported to others and used to balance `any:`. Called often, on the
     /// service's executor, so it must be quick. If empty, the load is the number of unfinished handlers, without a pool
     /// of workers.

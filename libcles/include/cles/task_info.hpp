@@ -19,6 +19,9 @@ struct task_info {
     /// Its requests, except BIND, run only with the signature of a member of the fleet, and updates of the task's nouns
     /// are signed. A node without security refuses both with `denied`.
     bool must_be_signed = false;
+    /// What it tells about its types, as `cles::task_types` makes it; set by `cles::typed_registrar`
+    /// (<cles/types.hpp>).
+    std::string types{};
 };
 
 } // namespace cles

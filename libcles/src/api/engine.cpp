@@ -33,6 +33,7 @@ core::local_node_options options_of(service_options&& all, asio_port::asio_envir
                                              .bounds = all.limits,
                                              .authorise = std::move(all.authorise),
                                              .tracing = all.tracing,
+                                             .types = all.types,
                                              .log = std::move(all.log),
                                              .metrics = std::move(all.metrics),
                                              .load = std::move(all.load)},

@@ -19,7 +19,7 @@ node_state::node_state(node_options setup, const core::clock& source, const std:
       unsent(wake), published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch,
                               unsent, &tasks, security.get()),
       unsent_relayed(wake), remembered{.limit = bounds.remembered}, secured(security ? setup.secured(*this) : nullptr),
-      spans(setup.tracing != nullptr ? setup.tracing->make(*this, source) : nullptr) {
+      spans(setup.tracing != nullptr ? setup.tracing->make(*this, source) : nullptr), types(setup.types) {
     peers.begin(setup.pool, started);
 }
 

@@ -26,6 +26,7 @@
 
 namespace cles::detail {
 struct tracing_part;
+struct types_part;
 } // namespace cles::detail
 
 namespace cles::core {
@@ -52,6 +53,7 @@ struct node_options {
     std::unique_ptr<security_protocol> (*secured)(node_state& host) = nullptr;
     other_pools* pools = nullptr;                  ///< owned by `metrics`; null: the node reaches its own pool only
     const detail::tracing_part* tracing = nullptr; ///< null: nothing is recorded of traced requests
+    const detail::types_part* types = nullptr;     ///< null: the types of its tasks are not told
     log_sink log{};
     std::function<void(json_writer&)> metrics{}; ///< metrics of the program
     std::function<node_load()> load{};           ///< load of the program; empty: its running handlers
@@ -101,6 +103,7 @@ struct node_state {
     reflection_limit reflection;
     const std::unique_ptr<security_protocol> secured; ///< null: the node is not secured
     const std::shared_ptr<span_recorder> spans;       ///< null: nothing is recorded of traced requests
+    const detail::types_part* const types;            ///< null: the types of its tasks are not told
     std::uint64_t next_id = 1;                        ///< of the requests that this node sends
     router* active_router = nullptr;                  ///< serves requests for `any`, `all` and other nodes; null: none
 

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 // Conversions of every supported type, in both directions: text from anybody is read without a fault, and values of any
-// bytes are written as JSON that is read back as the same value, or refused.
+// bytes are written as JSON that is read back as the same value, or refused. The schema of a type and its reader accept
+// the same texts.
 #include <cles/convert.hpp>
 #include <cles/convert_chrono.hpp>
 #include <cles/convert_wrapped.hpp>
 #include <cles/json_value.hpp>
+#include <cles/schema.hpp>
+#include <cles/type_schema.hpp>
 
 #include "fuzz/fuzz.hpp"
 
@@ -34,6 +37,29 @@ namespace {
 enum class colour : std::uint8_t { red, green };
 BOOST_DESCRIBE_ENUM(colour, red, green)
 
+enum class sensors : std::uint16_t { none = 0, gps = 1, imu = 2, lidar = 8 };
+BOOST_DESCRIBE_ENUM(sensors, none, gps, imu, lidar)
+[[maybe_unused]] constexpr sensors operator|(sensors a, sensors b) {
+    return static_cast<sensors>(static_cast<unsigned>(a) | static_cast<unsigned>(b));
+}
+
+class hidden {
+  public:
+    hidden() = default;
+    explicit hidden(float angle) : angle_(angle) {}
+
+  private:
+    float angle_ = 0;
+
+    BOOST_DESCRIBE_CLASS(hidden, (), (), (), (angle_))
+    friend CLES_NAMES(hidden, (angle_, "angle"))
+};
+
+struct alone {
+    double value = 0;
+};
+BOOST_DESCRIBE_STRUCT(alone, (), (value))
+
 struct measured {
     double value = 0;
     std::optional<std::string> unit;
@@ -41,6 +67,20 @@ struct measured {
 };
 BOOST_DESCRIBE_STRUCT(measured, (), (value, unit, error))
 CLES_DEFAULTS(measured, (error))
+CLES_FIELD(measured, value, "K", "temperature")
+
+struct bounded {
+    double lat = 0;
+    float share = 0;
+    std::int16_t gear = 0;
+    std::optional<std::uint64_t> count;
+};
+BOOST_DESCRIBE_STRUCT(bounded, (), (lat, share, gear, count))
+CLES_DEFAULTS(bounded, (gear))
+CLES_FIELD(bounded, lat, "deg", "latitude", -90, 90)
+CLES_FIELD(bounded, share, "", "", 0, 1)
+CLES_FIELD(bounded, gear, "", "", -1, 6)
+CLES_FIELD(bounded, count, "", "", 1, 1000)
 
 struct tagged : measured {
     colour tag = colour::red;
@@ -118,6 +158,18 @@ struct maker<colour> {
     static colour make(source& from) { return from.below(2) == 1 ? colour::green : colour::red; }
 };
 template <>
+struct maker<sensors> {
+    static sensors make(source& from) { return from.bits<sensors>(); }
+};
+template <>
+struct maker<hidden> {
+    static hidden make(source& from) { return hidden{fuzz::make<float>(from)}; }
+};
+template <>
+struct maker<alone> {
+    static alone make(source& from) { return {fuzz::make<double>(from)}; }
+};
+template <>
 struct maker<std::string> {
     static std::string make(source& from) { return std::string{from.text()}; }
 };
@@ -141,6 +193,15 @@ template <>
 struct maker<tagged> {
     static tagged make(source& from) {
         return {fuzz::make<measured>(from), fuzz::make<colour>(from), fuzz::make<std::array<std::int16_t, 2>>(from)};
+    }
+};
+template <>
+struct maker<bounded> {
+    static bounded make(source& from) {
+        return {.lat = fuzz::make<double>(from),
+                .share = fuzz::make<float>(from),
+                .gear = fuzz::make<std::int16_t>(from),
+                .count = fuzz::make<std::optional<std::uint64_t>>(from)};
     }
 };
 template <>
@@ -185,7 +246,7 @@ struct maker<Map> {
     static Map make(source& from) {
         Map made;
         for (auto more = from.below(4); more != 0; --more) {
-            auto key = fuzz::make<std::string>(from);
+            auto key = fuzz::make<typename Map::key_type>(from);
             made.insert_or_assign(std::move(key), fuzz::make<typename Map::mapped_type>(from));
         }
         return made;
@@ -256,8 +317,12 @@ inline constexpr bool is_exact<std::chrono::duration<Rep, Period>> = std::ratio_
 template <std::floating_point Rep, class Period>
 inline constexpr bool is_exact<std::chrono::sys_time<std::chrono::duration<Rep, Period>>> = false;
 
-template <class Value>
-inline constexpr bool is_exact<std::unordered_map<std::string, Value>> = false;
+template <class Key, class Value>
+inline constexpr bool is_exact<std::unordered_map<Key, Value>> = false;
+
+/// Whether its schema tells what its reader accepts.
+template <class T>
+inline constexpr bool is_told = !std::is_same_v<T, boost::json::value>;
 
 // -- the properties ------------------------------------------------------------------------------------------------
 
@@ -278,6 +343,51 @@ std::optional<std::string> written(const T& value) {
 }
 
 template <class T>
+const schema& schema_of_type() {
+    static const schema made{[] {
+        detail::schema_writer writer;
+        detail::write_schema<T>(writer);
+        return writer.finish();
+    }()};
+    return made;
+}
+
+/// \tparam T what is read, \tparam Told whose schema it is
+template <class T, class Told = T>
+void check_agreement(std::string_view text) {
+    if constexpr (is_told<T>) {
+        T read{};
+        std::string why;
+        const bool is_read = from_json(text, read, &why);
+        const auto mismatch = schema_of_type<Told>().mismatch(text);
+        require(is_read == mismatch.empty(), "reader and schema agree",
+                std::string{text} + ": reader: " + why + "; schema: " + mismatch);
+    }
+}
+
+/// Other texts: one value of `text` is replaced, or left out.
+template <class Check>
+void with_near_misses(std::string_view text, Check check) {
+    check(text);
+    constexpr std::size_t most = 3; // places, which differ with the size of the text
+    const auto skipped = text.size() % most;
+    std::size_t places = 0;
+    for (std::size_t at = 0; at < text.size() && places < skipped + most; ++at) {
+        if (std::string_view{":[,"}.find(text[at]) == std::string_view::npos || places++ < skipped) {
+            continue;
+        }
+        const auto begin = at + 1;
+        const auto end = std::min(text.find_first_of(",]}", begin), text.size());
+        for (const std::string_view other :
+             {"null", "true", "-1", "0", "1.5", "1e300", "1e999", "300", "18446744073709551615", "\"red\"", "\"PT1S\"",
+              "\"2026-01-01T00:00:00Z\"", "{}", "[]", "{\"value\":1}"}) {
+            check(std::string{text.substr(0, begin)}.append(other).append(text.substr(end)));
+        }
+    }
+    check(std::string{"{"}.append(text.substr(std::min(text.find(',') + 1, text.size()))));
+}
+
+template <class T>
 void check_written(const T& value) {
     const auto text = written(value);
     if (!text) {
@@ -289,24 +399,29 @@ void check_written(const T& value) {
     T again{};
     std::string why;
     require(from_json(*text, again, &why), "what is written can be read", *text + ": " + why);
+    with_near_misses(*text, [](std::string_view near) { check_agreement<T>(near); });
     require(!is_exact<T> || written(again) == text, "it is written the same", *text);
 
-    // These are sent as they are; the other end refuses scalars.
-    constexpr bool is_any_json = std::is_same_v<T, json_text> || std::is_same_v<T, boost::json::value>;
-    if (is_any_json && text->front() != '{' && text->front() != '[') {
-        return;
-    }
     using carrier = std::conditional_t<detail::comes_wrapped<T>, detail::wrapped<T>, T>;
     const auto body = detail::to_body(value);
     require(body.starts_with('{') || body.starts_with('['), "a body is an object or an array", body);
+    with_near_misses(body, [](std::string_view near) {
+        if constexpr (is_told<T>) {
+            check_agreement<carrier, detail::content<T>>(near);
+        }
+    });
     carrier carried{};
     require(from_json(body, carried, &why), "a body can be read", body + ": " + why);
+    if constexpr (detail::comes_wrapped<T>) {
+        require(!is_exact<T> || written(carried.value) == text, "a body is read as what was written", body);
+    }
 }
 
 template <class T>
 void check(std::string_view input) {
     T read{};
     std::string why;
+    check_agreement<T>(input);
     if (from_json(input, read, &why)) {
         check_written(read);
     } else {
@@ -345,8 +460,12 @@ void run(std::string_view input) {
     namespace chrono = std::chrono;
     check_all<bool, signed char, unsigned char, short, unsigned short, int, unsigned, long, unsigned long, long long,
               unsigned long long>(input);
-    check_all<float, double, long double, std::string, json_text, colour>(input);
-    check_all<measured, tagged, tree>(input);
+    check_all<char, char8_t, char16_t, char32_t, wchar_t>(input);
+    check_all<float, double, long double, std::string, json_text, colour, sensors>(input);
+    check_all<measured, tagged, bounded, tree, hidden>(input);
+    check_all<std::map<std::int16_t, bool>, std::unordered_map<char, bool>, std::map<sensors, double>>(input);
+    check_all<std::variant<alone, double>, std::optional<std::map<std::string, std::optional<double>>>,
+              std::variant<std::map<std::string, alone>, alone, bool, double>>(input);
     check_all<std::vector<std::string>, std::vector<bool>, std::array<double, 2>, std::pair<int, std::string>,
               std::tuple<bool, float, std::vector<int>>, std::map<std::string, tagged>,
               std::unordered_map<std::string, std::int8_t>>(input);

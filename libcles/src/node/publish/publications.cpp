@@ -307,4 +307,14 @@ std::set<std::string> publications::tasks() const {
     return names;
 }
 
+std::set<std::string> publications::paths() const {
+    std::set<std::string> found;
+    for (const auto& [path, each] : topics_) {
+        if (each->has_value()) {
+            found.insert(path);
+        }
+    }
+    return found;
+}
+
 } // namespace cles::core

@@ -135,6 +135,8 @@ class publications final : public topic_source {
 
     /// The names of the tasks that have been published.
     [[nodiscard, gnu::cold]] std::set<std::string> tasks() const;
+    /// The nouns that have a value, as canonical paths.
+    [[nodiscard, gnu::cold]] std::set<std::string> paths() const;
 
   private:
     [[gnu::cold]] topic& open(std::string_view path, bool to_publish);

@@ -10,6 +10,7 @@
 #include "node/membership/peer_table.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/security_protocol.hpp"
+#include "node/session/task_types.hpp"
 #include "node/sharing/movable_request.hpp"
 #include "node/tracing/span_recorder.hpp"
 #include "port/node_security.hpp"
@@ -104,6 +105,12 @@ void serve_peers(node_state& host, reply_writer& replies, const protocol::reques
     });
 }
 
+/// True if the request is for a task of a part that this node may have: security, or types. The part has replied.
+bool served_by_a_part(node_state& host, reply_writer& replies, const protocol::request_line& r, const identity& peer) {
+    return (host.secured && host.secured->serve_reserved(replies, r)) ||
+           (host.types != nullptr && r.verb == verb::pull && host.types->serve(host, replies, r, peer));
+}
+
 } // namespace
 
 bool is_spans_request(const protocol::request_line& r) noexcept {
@@ -142,6 +149,9 @@ void write_description(json_writer& w, const node_state& n, told_tasks told) {
     if (n.spans) {
         features.emplace_back("trace");
     }
+    if (n.types != nullptr) {
+        features.emplace_back("types");
+    }
     write_member(w, "features", features);
     w.plain_key("limits"); // of what is sent to it
     w.begin_object();
@@ -155,6 +165,9 @@ void write_description(json_writer& w, const node_state& n, told_tasks told) {
         write_tasks(w, n, told);
     } else {
         w.null(); // readers would take a list without entries, or none, for a node that offers nothing
+    }
+    if (n.types != nullptr) {
+        write_member(w, "types", n.types->digest(n));
     }
     write_load_member(w, n.load_now());
     if (n.security) {
@@ -240,7 +253,7 @@ void serve_reserved(node_state& host, reply_writer& replies, const protocol::req
         } else {
             replies.fail(r, errc::bad_request, host.name + ": a trace is named by 32 lower-case hex digits, not all 0");
         }
-    } else if (host.secured && host.secured->serve_reserved(replies, r)) {
+    } else if (served_by_a_part(host, replies, r, peer)) {
         return;
     } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {
         replies.fail(r, errc::bad_request, host.name + ": cancel needs an id from 1 to 2^63-1");
