@@ -2,6 +2,7 @@
 // Every kind of user code that the library calls, what it may do, and where it may be called: nothing else is harmed
 // (CONTRIBUTING.md, "User code"). Completion handlers of requests: user_code_completions_test.cpp.
 
+#include <cles/job_feed.hpp>
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
@@ -294,6 +295,26 @@ CLES_DATA_TEST_CASE(a_handler_for_requests_may_do_anything, every_deed, does) {
             check_answers(w, peer, does, quick);
         }
     }
+}
+
+// What it throws is the answer of its job.
+CLES_DATA_TEST_CASE(a_callback_of_a_jobs_feed_may_do_anything, every_deed, does) {
+    world w;
+    int quick = 0;
+    offer_acting(w, does, quick);
+    w.tower->update("watched", 1);
+    cles::job_feed watched;
+    w.tower->on_delegate("job", [&](const cles::request&, const cles::responder& job) {
+        watched = job.bind("self:watched");
+        watched.next([&w, does, job](boost::system::error_code, const cles::job_event&) {
+            w.act(does);
+            job.done(1);
+        });
+    });
+    scripted_peer peer{w.io, w.tower->endpoints().front()};
+    peer.send("DELEGATE self:job id=1\nPULL self:quick id=2\n");
+    w.until([&] { return w.acted == 1; });
+    check_answers(w, peer, does, quick);
 }
 
 // As one of the nodes that `any` or `all` select.

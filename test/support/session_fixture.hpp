@@ -29,7 +29,8 @@ class test_node {
   public:
     explicit test_node(limits bounds = {}, authoriser rules = {}, log_sink log = {},
                        core::completion_queue::runner complete = {}, std::shared_ptr<core::node_security> security = {},
-                       const detail::tracing_part* tracing = nullptr, core::other_pools* pools = nullptr)
+                       const detail::tracing_part* tracing = nullptr, core::other_pools* pools = nullptr,
+                       const detail::jobs_part* jobs = nullptr)
         : host(std::make_shared<core::node_state>(core::node_options{.name = "car1",
                                                                      .epoch = 0x5f3a09c1,
                                                                      .first_datagram_id = first_datagram_id,
@@ -39,6 +40,7 @@ class test_node {
                                                                      .secured = &core::make_secured_protocol,
                                                                      .pools = pools,
                                                                      .tracing = tracing,
+                                                                     .jobs = jobs,
                                                                      .log = std::move(log),
                                                                      .complete = std::move(complete)},
                                                   clock, [this] { ++wakes; })) {}

@@ -26,11 +26,19 @@ namespace core {
 class call;
 } // namespace core
 
+class job_feed;
+
 /// Receives the reply to a request of a job: JSON, or the error and the peer's message.
 using answer_callback =
     std::function<void(boost::system::error_code code, std::string_view json, std::string_view message)>;
 
 namespace detail {
+
+class job_feed_control;
+struct job_feed_request;
+/// Makes a feed of a job in a service. It is an argument, so that only programs whose jobs bind contain that code; null
+/// in a plugin.
+using job_feed_maker = std::shared_ptr<job_feed_control> (*)(const job_feed_request&);
 
 /// The implementation of a responder: in the service, in the runtime's pool, and in a plugin.
 class call_control {
@@ -44,6 +52,9 @@ class call_control {
     virtual void on_stop(std::function<void()> callback) = 0;
     [[nodiscard]] virtual bool stopped() const noexcept = 0;
     virtual void delegate(std::string_view command, const call_options& options, answer_callback answered) = 0;
+    /// For `responder::bind`. \throws cles::error with `failed` if jobs have no feeds here
+    virtual std::shared_ptr<job_feed_control> bind(job_feed_maker make, std::string_view noun,
+                                                   const bind_options& options);
     virtual void log(log_level level, std::string_view text) = 0;
     virtual void record_times(std::chrono::nanoseconds /*queued*/, std::chrono::nanoseconds /*ran*/) {}
     /// \throws cles::error with `failed` if there is none, as in a plugin
@@ -117,6 +128,12 @@ class responder {
         call_->delegate(command, {}, std::move(answered));
     }
 
+    /// Binds a noun on behalf of this job, such as "car0:speed", with the rights of this node. Include
+    /// <cles/job_feed.hpp>, which explains the result. Returns at once: whether the publisher accepts it, the first
+    /// `next` of the feed tells. A job has 64 feeds at most; none of them is bound by multicast.
+    [[nodiscard]] job_feed bind(std::string_view noun, const bind_options& options) const;
+    [[nodiscard]] job_feed bind(std::string_view noun) const;
+
     /// Writes to the service's log.
     void log(log_level level, std::string_view text) const { call_->log(level, text); }
 
@@ -132,7 +149,7 @@ class responder {
 
     /// Whether it may be used and destroyed on any thread: true for jobs on a pool of workers, and in plugins.
     [[nodiscard]] bool is_thread_safe() const noexcept { return call_->is_thread_safe(); }
-    /// For <cles/sharing.hpp>.
+    /// For <cles/sharing.hpp> and <cles/jobs.hpp>.
     [[nodiscard]] const std::shared_ptr<core::call>& node_call() const noexcept { return call_->node_call(); }
 
   private:

@@ -69,6 +69,7 @@ namespace detail {
 /// Adds to a service's environment and to the settings of its node. As a function, it adds less to programs without one
 /// than an object would.
 using service_part = std::function<void(asio_port::asio_environment&, core::node_options&)>;
+struct jobs_part;
 struct tracing_part;
 struct types_part;
 } // namespace detail
@@ -126,6 +127,9 @@ struct service_options {
     /// `cles::types()` tells others the types of the node's tasks, and its nouns (<cles/types.hpp>). If null, requests
     /// for them fail with `no_task`.
     const detail::types_part* types = nullptr;
+    /// `cles::jobs()` lists the jobs of this node to others, who may cancel them, and tells how long its tasks take
+    /// (<cles/jobs.hpp>). If null, requests for that fail with `no_task`.
+    const detail::jobs_part* jobs = nullptr;
     /// Returns the load of this node, which is reported to others and used to balance `any:`. Called often, on the
     /// service's executor, so it must be quick. If empty, the load is the number of unfinished handlers, without a pool
     /// of workers.

@@ -4,6 +4,7 @@
 #include <cles/reply_operation.hpp>
 #include <cles/responder.hpp>
 
+#include "api/job_feeds.hpp"
 #include "node/session/call.hpp"
 #include "transport/member_handler.hpp"
 
@@ -34,6 +35,7 @@ core::local_node_options options_of(service_options&& all, asio_port::asio_envir
                                              .authorise = std::move(all.authorise),
                                              .tracing = all.tracing,
                                              .types = all.types,
+                                             .jobs = all.jobs,
                                              .log = std::move(all.log),
                                              .metrics = std::move(all.metrics),
                                              .load = std::move(all.load)},
@@ -64,6 +66,7 @@ class service_call final : public call_control, public std::enable_shared_from_t
         if (asked_) {
             call_->forget_on_stop(); // it refers to this object
         }
+        close_feeds();
         if (call_->ended()) {
             return;
         }
@@ -74,14 +77,19 @@ class service_call final : public call_control, public std::enable_shared_from_t
         }
     }
 
-    void done(std::string_view json) override { call_->done(json); }
+    void done(std::string_view json) override {
+        call_->done(json);
+        close_feeds();
+    }
     void fail(errc code, std::string_view message) override {
         call_->fail({.code = code, .message = std::string{message}});
+        close_feeds();
     }
     void refuse(std::string_view message, std::chrono::milliseconds retry) override {
         constexpr std::chrono::milliseconds::rep most = 86'400'000; // a day, as for plugins
         const auto ms = std::clamp<std::chrono::milliseconds::rep>(retry.count(), 0, most);
         call_->fail({.code = errc::busy, .message = std::string{message}, .retry_ms = static_cast<std::uint64_t>(ms)});
+        close_feeds();
     }
     bool progress(double fraction, std::string_view json) override { return call_->progress(fraction, json); }
     void on_stop(std::function<void()> callback) override {
@@ -107,6 +115,21 @@ class service_call final : public call_control, public std::enable_shared_from_t
         } else {
             send(*by, command, options, std::move(answered), left);
         }
+    }
+    std::shared_ptr<job_feed_control> bind(job_feed_maker make, std::string_view noun,
+                                           const bind_options& options) override {
+        const auto by = std::static_pointer_cast<engine>(service_.lock());
+        const bool ended = call_->ended();
+        if (by && !by->stopped() && !ended) {
+            take_on_stop();
+        }
+        return make({.service = by,
+                     .ended = ended,
+                     .executor = &executor_,
+                     .job = weak_from_this(),
+                     .noun = noun,
+                     .options = &options,
+                     .feeds = &feeds_});
     }
     void record_times(std::chrono::nanoseconds queued, std::chrono::nanoseconds ran) override {
         call_->record_times(queued, ran);
@@ -148,11 +171,7 @@ class service_call final : public call_control, public std::enable_shared_from_t
 
     void send(core::local_node& by, std::string_view command, const call_options& options, answer_callback answered,
               std::chrono::milliseconds left) {
-        if (!asked_) { // a call has one stop callback: this object takes it, and then calls the handler's
-            asked_ = std::make_unique<asked>();
-            asked_->then = call_->forget_on_stop();
-            call_->on_stop([this] { withdraw_asked(); });
-        }
+        take_on_stop();
         const auto key = ++asked_->last;
         asked_->tickets.emplace(key, 0);
         const auto why = std::make_shared<std::string>();
@@ -177,6 +196,21 @@ class service_call final : public call_control, public std::enable_shared_from_t
         }
     }
 
+    // A call has one stop callback: this object takes it, and then calls the handler's.
+    void take_on_stop() {
+        if (!asked_) {
+            asked_ = std::make_unique<asked>();
+            asked_->then = call_->forget_on_stop();
+            call_->on_stop([this] { withdraw_asked(); });
+        }
+    }
+
+    void close_feeds() {
+        if (const auto feeds = std::exchange(feeds_, nullptr)) {
+            feeds->close();
+        }
+    }
+
     /// Wraps the handler's callback so that it is called as user code. Posted: calls are stopped while the library
     /// iterates over what a lost link has left.
     [[nodiscard]] std::function<void()> put(std::function<void()> callback) const {
@@ -196,6 +230,9 @@ class service_call final : public call_control, public std::enable_shared_from_t
                     by->cancel(ticket);
                 }
             }
+            if (const auto feeds = std::exchange(feeds_, nullptr)) {
+                feeds->close_soon(*call_);
+            }
         };
         // First the job's own: it must know that it was stopped when its requests fail for that reason.
         try {
@@ -212,7 +249,8 @@ class service_call final : public call_control, public std::enable_shared_from_t
     std::shared_ptr<core::call> call_;
     boost::asio::any_io_executor executor_;
     std::weak_ptr<core::local_node> service_;
-    std::unique_ptr<asked> asked_; ///< from its first request on
+    std::unique_ptr<asked> asked_;         ///< from its first request or binding on
+    std::shared_ptr<job_feed_list> feeds_; ///< from its first binding on
 };
 
 } // namespace

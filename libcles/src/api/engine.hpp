@@ -10,6 +10,7 @@
 #include <boost/asio/any_io_executor.hpp>
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string_view>
@@ -44,8 +45,9 @@ class engine final : public core::local_node {
     std::shared_ptr<posted_updates> posted_updates_; // created when the program first publishes from other threads
 };
 
-/// The requested feed, or one whose `start` fails with the reason.
+/// The requested feed, or one whose `start` fails with the reason. \param most updates that wait in it; 0: as many as
+/// `limits::feed`
 std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std::string_view noun,
-                                        const bind_options& options);
+                                        const bind_options& options, std::size_t most = 0);
 
 } // namespace cles::detail

@@ -14,6 +14,7 @@
 #include <boost/asio/post.hpp>
 
 #include <algorithm>
+#include <cstddef>
 #include <memory>
 #include <random>
 #include <string>
@@ -113,8 +114,9 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
 /// A feed that is bound by a link.
 class link_feed final : public feed_handle {
   public:
-    link_feed(const std::shared_ptr<engine>& by, std::string target, std::string path, bool thinned)
-        : feed_handle(by), machine_(by->feeds(), by->deadlines(), by->completions(), by->bounds(), std::move(target),
+    link_feed(const std::shared_ptr<engine>& by, const limits& bounds, std::string target, std::string path,
+              bool thinned)
+        : feed_handle(by), machine_(by->feeds(), by->deadlines(), by->completions(), bounds, std::move(target),
                                     std::move(path), thinned, seed()) {}
 
     [[nodiscard]] core::feed_machine& machine() noexcept { return machine_; }
@@ -135,8 +137,8 @@ class link_feed final : public feed_handle {
 /// A feed that is bound through the multicast group, in which the service takes part.
 class group_feed_handle final : public feed_handle {
   public:
-    group_feed_handle(const std::shared_ptr<engine>& by, std::string target, std::string path)
-        : feed_handle(by), feed_(by->bounds(), by->completions(), std::move(target), std::move(path)) {}
+    group_feed_handle(const std::shared_ptr<engine>& by, const limits& bounds, std::string target, std::string path)
+        : feed_handle(by), feed_(bounds, by->completions(), std::move(target), std::move(path)) {}
     ~group_feed_handle() override { leave(); }
 
     /// Completes as soon as the BIND has been sent: it is not answered.
@@ -211,7 +213,7 @@ refusal objection_to(engine& host, const protocol::noun_view& noun, const bind_o
 } // namespace
 
 std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std::string_view noun,
-                                        const bind_options& options) {
+                                        const bind_options& options, std::size_t most) {
     const auto refused = [&](errc code, std::string why) {
         return std::make_shared<refused_feed>(host, code, std::move(why));
     };
@@ -238,17 +240,19 @@ std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std
     std::string scratch;
     const std::string path{protocol::canonical_path(parts, scratch)};
     const std::string target{parts.target};
+    auto bounds = host->bounds();
+    bounds.feed = most != 0 ? most : bounds.feed;
     const bool routes = host->node().active_router != nullptr; // then links bind `all`, through this service itself
     if (options.multicast_ || (target == "all" && options.at_.empty() && is_own && !routes)) {
         if (auto objection = objection_to(*host, parts, options); !objection.message.empty()) {
             return refused(objection.code, std::move(objection.message));
         }
-        return std::make_shared<group_feed_handle>(host, target, path);
+        return std::make_shared<group_feed_handle>(host, bounds, target, path);
     }
     if (options.at_.empty()) {
         host->peer_channels().tell_of_second(target, options.diagnostics_);
     }
-    auto made = std::make_shared<link_feed>(host, target, path, options.every_.count() > 0);
+    auto made = std::make_shared<link_feed>(host, bounds, target, path, options.every_.count() > 0);
     host->feeds().enter(made->machine(), made,
                         {.noun = std::string{noun},
                          .at = is_own ? options.at_ : host->own_url(),

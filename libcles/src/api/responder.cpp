@@ -14,6 +14,11 @@ namespace detail {
 
 boost::asio::any_io_executor call_control::executor() const { throw error(errc::failed, "a plugin has no executor"); }
 
+std::shared_ptr<job_feed_control> call_control::bind(job_feed_maker /*make*/, std::string_view /*noun*/,
+                                                     const bind_options& /*options*/) {
+    throw error(errc::failed, "a job has no feeds here");
+}
+
 const std::shared_ptr<core::call>& call_control::node_call() const noexcept {
     static const auto& none = *new std::shared_ptr<core::call>; // NOLINT(bugprone-unhandled-exception-at-new): ends it
     return none;

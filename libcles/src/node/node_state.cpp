@@ -3,6 +3,7 @@
 
 #include "node/membership/gossip.hpp"
 #include "node/security_protocol.hpp"
+#include "node/session/job_table.hpp"
 #include "node/tracing/span_recorder.hpp"
 
 #include <utility>
@@ -19,7 +20,8 @@ node_state::node_state(node_options setup, const core::clock& source, const std:
       unsent(wake), published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch,
                               unsent, &tasks, security.get()),
       unsent_relayed(wake), remembered{.limit = bounds.remembered}, secured(security ? setup.secured(*this) : nullptr),
-      spans(setup.tracing != nullptr ? setup.tracing->make(*this, source) : nullptr), types(setup.types) {
+      spans(setup.tracing != nullptr ? setup.tracing->make(*this, source) : nullptr), types(setup.types),
+      jobs(setup.jobs != nullptr ? setup.jobs->make() : nullptr) {
     peers.begin(setup.pool, started);
 }
 

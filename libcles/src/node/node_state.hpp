@@ -25,6 +25,7 @@
 #include <vector>
 
 namespace cles::detail {
+struct jobs_part;
 struct tracing_part;
 struct types_part;
 } // namespace cles::detail
@@ -32,6 +33,7 @@ struct types_part;
 namespace cles::core {
 
 class gossip;
+class job_table;
 class node_security;
 class other_pools;
 class request_sharing;
@@ -54,6 +56,7 @@ struct node_options {
     other_pools* pools = nullptr;                  ///< owned by `metrics`; null: the node reaches its own pool only
     const detail::tracing_part* tracing = nullptr; ///< null: nothing is recorded of traced requests
     const detail::types_part* types = nullptr;     ///< null: the types of its tasks are not told
+    const detail::jobs_part* jobs = nullptr;       ///< null: its jobs are not listed
     log_sink log{};
     std::function<void(json_writer&)> metrics{}; ///< metrics of the program
     std::function<node_load()> load{};           ///< load of the program; empty: its running handlers
@@ -104,6 +107,7 @@ struct node_state {
     const std::unique_ptr<security_protocol> secured; ///< null: the node is not secured
     const std::shared_ptr<span_recorder> spans;       ///< null: nothing is recorded of traced requests
     const detail::types_part* const types;            ///< null: the types of its tasks are not told
+    const std::unique_ptr<job_table> jobs;            ///< null: its jobs are not listed
     std::uint64_t next_id = 1;                        ///< of the requests that this node sends
     router* active_router = nullptr;                  ///< serves requests for `any`, `all` and other nodes; null: none
 

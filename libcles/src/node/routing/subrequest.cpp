@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/routing/subrequest.hpp"
 
+#include "node/session/job_table.hpp"
 #include "node/session/reply_writer.hpp"
 #include "node/session/request_checks.hpp"
 #include "node/session/reserved_tasks.hpp"
@@ -108,6 +109,8 @@ void local_request::run(const protocol::request_line& r, const identity& peer, t
         write_description(w, *node_);
     } else if (r.noun.path == "cles/metrics") {
         write_metrics(w, *node_);
+    } else if (r.noun.path == "cles/jobs" && node_->jobs) {
+        node_->jobs->write(w, *node_, node_->bounds.line / 2); // the other half is for those of other nodes
     } else if (const auto id = protocol::parse_trace_id(is_spans_request(r) ? r.noun.parameters[1] : "");
                id && node_->spans) {
         node_->spans->write(w, *id, now);

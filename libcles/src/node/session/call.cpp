@@ -2,6 +2,7 @@
 #include "node/session/call.hpp"
 
 #include "node/session/handler_failure.hpp"
+#include "node/session/job_table.hpp"
 #include "node/session/request_checks.hpp"
 #include "node/tracing/span_recorder.hpp"
 
@@ -18,6 +19,9 @@ call::call(std::shared_ptr<node_state> host, task_sink& owner, terms wanted, std
 }
 
 call::~call() {
+    if (job_ != 0) {
+        node_->jobs->remove(job_);
+    }
     --node_->counts.handlers_running;
     node_->counts.routed -= terms_.routed ? 1 : 0;
 }
@@ -86,6 +90,9 @@ task_sink& call::end() {
     if (!terms_.routed) { // that time is other nodes'
         const auto took = node_->time.now() - started_;
         node_->handler_time.record(took);
+        if (job_ != 0) {
+            node_->jobs->note_answer(job_, took);
+        }
         if (terms_.trace.sampled && !times_recorded_) {
             record_times({}, took);
         }
@@ -104,11 +111,11 @@ void call::take_back() noexcept {
 }
 
 bool call::progress(double fraction, std::string_view json) {
-    if (owner_ == nullptr || !terms_.wants_progress) {
+    if (owner_ == nullptr) {
         return false;
     }
     reported_ = std::max(reported_, std::clamp(fraction, 0.0, 1.0));
-    return owner_->report(*this, reported_, json);
+    return terms_.wants_progress && owner_->report(*this, reported_, json);
 }
 
 void call::record_times(std::chrono::nanoseconds queued, std::chrono::nanoseconds ran) {

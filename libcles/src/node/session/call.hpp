@@ -83,6 +83,12 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
 
     [[nodiscard]] const terms& wanted() const noexcept { return terms_; }
+    [[nodiscard]] time_point started() const noexcept { return started_; }
+    /// The greatest fraction that the handler has reported, whether or not the requester wants reports.
+    [[nodiscard]] double reported() const noexcept { return reported_; }
+    /// Its number in the list of the node's jobs; 0: it is not listed.
+    [[nodiscard]] std::uint64_t job() const noexcept { return job_; }
+    void list_as(std::uint64_t number) noexcept { job_ = number; }
     /// Adverbs that precede the result, in wire format.
     void set_head(std::string adverbs) { head_ = std::move(adverbs); }
     [[nodiscard]] const std::string& head() const noexcept { return head_; }
@@ -117,6 +123,7 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     std::string head_;
     std::function<void()> on_stop_;
     std::optional<movable_request> movable_;
+    std::uint64_t job_ = 0;
     bool stopped_ = false;
     bool times_recorded_ = false;
 };

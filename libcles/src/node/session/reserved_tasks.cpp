@@ -10,6 +10,7 @@
 #include "node/membership/peer_table.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/security_protocol.hpp"
+#include "node/session/job_table.hpp"
 #include "node/session/task_types.hpp"
 #include "node/sharing/movable_request.hpp"
 #include "node/tracing/span_recorder.hpp"
@@ -105,10 +106,11 @@ void serve_peers(node_state& host, reply_writer& replies, const protocol::reques
     });
 }
 
-/// True if the request is for a task of a part that this node may have: security, or types. The part has replied.
+/// True if the request is for a task of a part that this node may have: security, types, or jobs. The part has replied.
 bool served_by_a_part(node_state& host, reply_writer& replies, const protocol::request_line& r, const identity& peer) {
     return (host.secured && host.secured->serve_reserved(replies, r)) ||
-           (host.types != nullptr && r.verb == verb::pull && host.types->serve(host, replies, r, peer));
+           (host.types != nullptr && r.verb == verb::pull && host.types->serve(host, replies, r, peer)) ||
+           (host.jobs && host.jobs->serve(host, replies, r, peer));
 }
 
 } // namespace
@@ -215,6 +217,10 @@ void write_metrics(json_writer& w, const node_state& n, shown_counters shown) {
     quantile("p99", 0.99);
     quantile("p999", 0.999);
     w.end_object();
+    if (n.jobs && shown == shown_counters::all) {
+        w.plain_key("tasks_us");
+        n.jobs->write_times(w);
+    }
     if (n.metrics) {
         if (const auto members = own_metrics(n); !members.empty()) {
             w.raw(members);

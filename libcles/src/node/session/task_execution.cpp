@@ -6,6 +6,7 @@
 #include "node/security_protocol.hpp"
 #include "node/session/call.hpp"
 #include "node/session/handler_failure.hpp"
+#include "node/session/job_table.hpp"
 #include "node/session/request_checks.hpp"
 #include "node/sharing/movable_request.hpp"
 #include "node/tracing/span_recorder.hpp"
@@ -91,8 +92,8 @@ namespace {
 /// Measures the time of every 16th plain handler, and of those of traced requests.
 class sampled_time {
   public:
-    sampled_time(node_state& host, const protocol::trace_context& trace) noexcept
-        : node_(host), span_(trace.sampled && host.spans ? trace.span : 0),
+    sampled_time(node_state& host, const protocol::request_line& line) noexcept
+        : node_(host), line_(line), span_(line.trace.sampled && host.spans ? line.trace.span : 0),
           runs_(host.plain_runs++ % 16 == 0 || span_ != 0), before_(runs_ ? host.time.now() : time_point{}) {}
     sampled_time(const sampled_time&) = delete;
     sampled_time& operator=(const sampled_time&) = delete;
@@ -100,6 +101,9 @@ class sampled_time {
         if (runs_) {
             const auto took = node_.time.now() - before_;
             node_.handler_time.record(took);
+            if (node_.jobs) {
+                node_.jobs->record(line_.verb, line_.noun.task, took);
+            }
             if (span_ != 0) {
                 node_.spans->add_times(span_, {}, took);
             }
@@ -108,6 +112,7 @@ class sampled_time {
 
   private:
     node_state& node_;
+    const protocol::request_line& line_;
     std::uint64_t span_; // 0: not traced
     bool runs_;
     time_point before_;
@@ -216,7 +221,7 @@ std::optional<protocol::failure> task_execution::signature_refusal() {
 }
 
 void task_execution::write(json_writer& w) {
-    const sampled_time during{*node_, line_.trace};
+    const sampled_time during{*node_, line_};
     started_ = true;
     handler_->plain(request_, w);
     if (line_.verb == verb::update) {
@@ -244,6 +249,11 @@ void task_execution::start(task_sink& to, const std::shared_ptr<memory_account>&
     }
     if (node_->sharing != nullptr) {
         c->set_movable(node_->sharing->movable(line_, handler_->info, *data_.peer));
+    }
+    if (node_->jobs) {
+        c->list_as(
+            node_->jobs->add(*c, line_.noun.task,
+                             origin_.requester.empty() ? std::string_view{data_.peer->address} : origin_.requester));
     }
     to.keep(*this, c);
     started_ = true;
