@@ -2,6 +2,7 @@
 #include <cles/error.hpp>
 #include <cles/security.hpp>
 
+#include "api/linked_security.hpp"
 #include "asio/asio_environment.hpp"
 #include "node/node_state.hpp"
 #include "node/secured/secured_protocol.hpp"
@@ -60,5 +61,7 @@ std::function<void(asio_port::asio_environment&, core::node_options&)> secured(s
 std::function<void(asio_port::asio_environment&, core::node_options&)> secured(const std::string& directory) {
     return secured(security_options{.directory = directory});
 }
+
+detail::service_part detail::linked_security(const char* directory) { return secured(std::string{directory}); }
 
 } // namespace cles
