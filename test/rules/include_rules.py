@@ -34,6 +34,7 @@ LAYERS = {
     "libcles/src/asio/": "asio",
     "libcles/src/api/": "api",
     "libcles/src/": "src",
+    "apps/shared/": "programs",
     "runtime/": "runtime",
     "plugins/": "plugins",
     "apps/": "apps",
@@ -58,11 +59,12 @@ MAY_INCLUDE = {
     "asio": {"public", "protocol", "port", "node", "transport"},
     "api": {"public", "json", "protocol", "port", "node", "transport", "asio", "federation", "nats", "security", "tls"},
     "src": {"public"},
-    "runtime": {"public"},
+    "programs": {"public"},
+    "runtime": {"public", "programs"},
     "plugins": {"public"},
-    "apps": {"public"},
+    "apps": {"public", "programs"},
     "perf": {"public"},
-    "test": LIBRARY | {"runtime", "plugins"},
+    "test": LIBRARY | {"programs", "runtime", "plugins"},
 }
 
 # The public headers that a transport may include although they are not plain.
@@ -147,7 +149,7 @@ INHERITED = [
                 re.DOTALL), "close-on-exec is missing"),
     (re.compile(r"(?<![\w>])::(dup|pipe|accept)\s*\("), "programs that are started inherit it: use a function that sets close-on-exec"),
 ]
-INHERITED_LAYERS = LIBRARY | {"runtime", "apps", "plugins"}
+INHERITED_LAYERS = LIBRARY | {"programs", "runtime", "apps", "plugins"}
 INHERITED_OF_ASIO = re.compile(r"\basync_accept\b|\bacceptor_?\.accept\(|\.open\([^;]*(protocol\(\)|::v[46]\(\))"
                                r"|(?<!make_private<udp::socket>)[({]\w+, *(\w+::)*(udp|tcp)::v[46]\(\)")
 
@@ -267,7 +269,7 @@ class Tree:
 
     def resolve(self, name: str, quote: str, header: str) -> str | None:
         """The file of this tree that an include means, or nothing where it is another project's."""
-        bases = ["libcles/include", "libcles/src", "runtime/include", "runtime/src", "runtime", "test"]
+        bases = ["libcles/include", "libcles/src", "apps/shared", "runtime/include", "runtime/src", "runtime", "test"]
         if quote == '"':
             bases.insert(0, str(Path(name).parent))
         for base in bases:
@@ -472,7 +474,7 @@ PLANTED = [
     ("libcles/src/security/a.cpp", "#include <fcntl.h>\n", "security is sans-I/O"),
     ("libcles/src/security/a.cpp", '#include "node/session.hpp"\n', "security must not include node"),
     ("libcles/src/security/keys/secret.cpp", "static std::mutex guard;\nstd::thread t;\n", "waits, locks or starts threads"),
-    ("libcles/src/api/a.cpp", "#include <spdlog/spdlog.h>\n", "spdlog is for programs"),
+    ("apps/shared/output/a.cpp", '#include "config/config.cpp"\n', "programs must not include runtime"),
     ("apps/cles/output/a.cpp", "#include <thread>\n", "this program has one thread"),
     ("libcles/src/api/a.cpp", '#include "nowhere.hpp"\n', "is not a file of this project"),
     ("libcles/src/util/a.cpp", "int a;\n", "is not a known layer"),

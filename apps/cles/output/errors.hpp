@@ -25,18 +25,6 @@ class usage_error : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// The reader of the output has closed it, as `head` does: a reason to end, but not an error.
-class output_closed : public std::exception {
-  public:
-    [[nodiscard]] const char* what() const noexcept override { return "the output is closed"; }
-};
-
-/// A write was interrupted by a signal.
-class output_interrupted : public std::exception {
-  public:
-    [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
-};
-
 /// Prints an error on stderr, as "cles: TEXT".
 void print_error(std::string_view text);
 

@@ -3,13 +3,27 @@
 
 #include <cles/printable.hpp>
 
+#include <chrono>
 #include <cstddef>
+#include <exception>
 #include <string>
 #include <string_view>
 
 namespace tool {
 
 enum class stream { out = 1, err = 2 };
+
+/// The reader of the output has closed it, as `head` does: a reason to end, but not an error.
+class output_closed : public std::exception {
+  public:
+    [[nodiscard]] const char* what() const noexcept override { return "the output is closed"; }
+};
+
+/// A write was interrupted by a signal.
+class output_interrupted : public std::exception {
+  public:
+    [[nodiscard]] const char* what() const noexcept override { return "interrupted"; }
+};
 
 bool is_terminal(stream s);
 
@@ -39,6 +53,10 @@ void write_output(std::string_view text);
 
 /// Writes the text to stderr in one call, so that lines of several processes do not mix.
 void write_stderr(std::string_view text);
+
+/// Writes what the stream takes within that time, and drops the rest: for a program that must not wait for a reader.
+/// May be used in a signal handler.
+void write_within(stream s, std::string_view text, std::chrono::milliseconds limit) noexcept;
 
 /// Whether the reader of stdout is gone, where that can be determined without writing.
 bool is_output_closed();

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "output/terminal.hpp"
 
-#include "output/errors.hpp"
-
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
@@ -98,6 +96,26 @@ void write_output(std::string_view text) { write_all(without_foreign_controls(te
 void write_stderr(std::string_view text) {
     const auto shown = without_foreign_controls(text);
     std::fwrite(shown.data(), 1, shown.size(), stderr);
+}
+
+void write_within(stream s, std::string_view text, std::chrono::milliseconds limit) noexcept {
+    constexpr std::size_t most = 512; // a pipe that is ready takes so much without waiting
+    const int descriptor = static_cast<int>(s);
+    const auto end = std::chrono::steady_clock::now() + limit;
+    while (!text.empty()) {
+        const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+        pollfd out{descriptor, POLLOUT, 0};
+        const auto ready = ::poll(&out, 1, static_cast<int>(std::max<std::chrono::milliseconds::rep>(left.count(), 0)));
+        if (ready < 0 && errno == EINTR) {
+            continue;
+        }
+        const auto written = ready == 1 ? ::write(descriptor, text.data(), std::min(text.size(), most)) : -1;
+        if (written >= 0) {
+            text.remove_prefix(static_cast<std::size_t>(written));
+        } else if (ready != 1 || (errno != EINTR && errno != EAGAIN)) {
+            return;
+        }
+    }
 }
 
 bool is_output_closed() {
