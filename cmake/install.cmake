@@ -102,6 +102,18 @@ foreach(program IN ITEMS cles_command cles_bench clesd)
     endif()
 endforeach()
 
+# --- The daemon as a service ----------------------------------------------------------------------------------------------
+
+if(TARGET clesd)
+    set(units clesd)
+    install(CODE "
+        set(CLES_UNITS [[${units}]])
+        set(CLES_SOURCE_DIR [[${PROJECT_SOURCE_DIR}]])
+        set(CLES_BINDIR [[${CMAKE_INSTALL_BINDIR}]])
+        set(CLES_SYSCONFDIR [[${CMAKE_INSTALL_SYSCONFDIR}]])")
+    install(SCRIPT cmake/install_service.cmake)
+endif()
+
 # --- Plugins -----------------------------------------------------------------------------------------------------------
 
 foreach(plugin IN ITEMS cles_plugin_system cles_plugin_primes)
@@ -125,7 +137,8 @@ endforeach()
 
 # With the folders of the source tree, so that links between pages work.
 install(FILES LICENSE README.md CONTRIBUTING.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
-install(DIRECTORY config docs DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(DIRECTORY config docs DESTINATION "${CMAKE_INSTALL_DOCDIR}"
+    PATTERN "*.in" EXCLUDE PATTERN "*.sysusers" EXCLUDE)
 install(DIRECTORY plugins/primes plugins/template DESTINATION "${CMAKE_INSTALL_DOCDIR}/plugins")
 install(DIRECTORY apps/examples DESTINATION "${CMAKE_INSTALL_DOCDIR}/apps"
     FILES_MATCHING PATTERN "*.cpp" PATTERN "*.hpp")

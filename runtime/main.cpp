@@ -11,14 +11,17 @@
 #include "daemon/daemon_log.hpp"
 #include "daemon/service_manager.hpp"
 #include "daemon/service_parts.hpp"
+#include "daemon/start_trial.hpp"
 #include "isolation/plugin_process_main.hpp"
+#include "output/terminal.hpp"
 #include "plugins/plugin_trial.hpp"
 
 #include <boost/asio/io_context.hpp>
 
 #include <array>
+#include <atomic>
+#include <chrono>
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
 #include <exception>
 #include <memory>
@@ -39,13 +42,11 @@ constexpr int cannot_run = 1;
 constexpr int wrong_usage = 2;
 constexpr int name_conflict = 3;
 
-void print(std::FILE* to, const std::string& text) {
-    std::fwrite(text.data(), 1, text.size(), to);
-    std::fflush(to);
-}
+// How long it waits for readers of its output, whom it must not depend on.
+constexpr std::chrono::seconds output_wait{1};
 
 int report(const std::string& text, int code) {
-    print(stderr, "clesd: " + text + "\n");
+    tool::write_within(tool::stream::err, "clesd: " + text + "\n", output_wait);
     return code;
 }
 
@@ -63,19 +64,6 @@ config_sources sources_of(const command_line_options& wanted) {
             .name_of_key = name_of_key};
 }
 
-// Plugins are tried, each in a process of its own, but not started: a running daemon may use their devices.
-int check_plugins(config setup) {
-    security_of(setup); // only reads the files
-    try_plugins(setup);
-    for (const auto& plugin : setup.plugins) {
-        if (!plugin.trial_error.empty()) {
-            report(plugin.trial_error + " (it is not required)", success);
-        }
-    }
-    print(stdout, (setup.file.empty() ? "without a file: " : setup.file + ": ") + "can be used\n");
-    return success;
-}
-
 // For a system error: what could not be done, then why, without repetition.
 std::string message_of(const error& e) {
     const auto why = e.code().message();
@@ -85,12 +73,15 @@ std::string message_of(const error& e) {
     return e.message().find(why) != std::string::npos ? e.message() : e.message() + ": " + why;
 }
 
-// Child processes must not notify the service manager.
-std::string take_notify_socket() {
+// Child processes must not notify it.
+service_manager take_service_manager() {
     const char* socket = std::getenv("NOTIFY_SOCKET");
-    std::string value = socket == nullptr ? "" : socket;
-    ::unsetenv("NOTIFY_SOCKET");
-    return value;
+    service_manager made{socket == nullptr ? "" : socket,
+                         watchdog_of(std::getenv("WATCHDOG_USEC"), std::getenv("WATCHDOG_PID"), ::getpid())};
+    for (const auto* name : {"NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID"}) {
+        ::unsetenv(name);
+    }
+    return made;
 }
 
 std::unique_ptr<const wake_bound> limit_wake_latency(const config& setup) {
@@ -101,28 +92,81 @@ std::unique_ptr<const wake_bound> limit_wake_latency(const config& setup) {
     }
 }
 
+run_options run_options_of(const config& setup) {
+    return {.busy_poll = setup.busy_poll,
+            .fifo_priority = static_cast<int>(setup.real_time),
+            .lock_memory = setup.real_time != 0};
+}
+
+/// While it lives, `std::terminate` waits for the log before it ends the process: what was logged last may be why.
+class log_before_terminate {
+  public:
+    explicit log_before_terminate(daemon_log& log) noexcept {
+        log_ = &log;
+        before_ = std::set_terminate(on_terminate);
+    }
+    log_before_terminate(const log_before_terminate&) = delete;
+    log_before_terminate& operator=(const log_before_terminate&) = delete;
+    ~log_before_terminate() { std::set_terminate(before_); }
+
+  private:
+    [[noreturn]] static void on_terminate() {
+        constexpr unsigned longest_s = 2;
+        std::signal(SIGALRM, SIG_DFL);
+        ::alarm(longest_s); // this thread may have the lock of the log
+        log_.load()->flush();
+        before_.load()();
+        std::abort();
+    }
+
+    static inline std::atomic<daemon_log*> log_{nullptr};
+    static inline std::atomic<std::terminate_handler> before_{nullptr};
+};
+
+// Does what `run` does, but ends what it has begun. Plugins are tried, each in a process of its own, but not started: a
+// running daemon may use their devices.
+int check_start(config setup) {
+    try_plugins(setup);
+    for (const auto& plugin : setup.plugins) {
+        if (!plugin.trial_error.empty()) {
+            report(plugin.trial_error + " (it is not required)", success);
+        }
+    }
+    const auto latency_limit = limit_wake_latency(setup);
+    const bool runs = try_start(setup, [](log_level level, const log_entry& entry) {
+        if (level >= log_level::warning) {
+            report("warning: " + std::string{entry.text}, success);
+        }
+    });
+    boost::asio::io_context idle{1};
+    cles::run(idle, run_options_of(setup));
+    tool::write_output((setup.file.empty() ? "without a file: " : setup.file + ": ") + "can be used" +
+                       (runs ? "; the node " + setup.node + " listens already" : "") + "\n");
+    return success;
+}
+
 int run(config setup, config_sources sources) {
-    auto notify_socket = take_notify_socket();
+    const auto manager = take_service_manager();
     try_plugins(setup); // while there are no threads
     const auto node = setup.node;
-    const run_options how{.busy_poll = setup.busy_poll,
-                          .fifo_priority = static_cast<int>(setup.real_time),
-                          .lock_memory = setup.real_time != 0};
+    const auto how = run_options_of(setup);
     daemon_log log{node, setup.log};
+    const log_before_terminate last_lines{log};
     const auto latency_limit = limit_wake_latency(setup); // before the service manager is notified
-    const service_manager manager{std::move(notify_socket)};
     boost::asio::io_context io{1};
     daemon clesd{io, std::move(setup), std::move(sources), log, manager};
+    log.flush(); // who reads that it listens may look for what it has logged before
     for (const auto& endpoint : clesd.endpoints()) {
         std::string line{node};
         line.append(" listening on ").append(endpoint).push_back('\n');
-        print(stdout, line);
+        tool::write_within(tool::stream::out, line, output_wait);
     }
     if (!manager.ready()) {
         log.warning("the service manager could not be notified");
     }
     cles::run(io, how);
     const int code = clesd.lost_name() ? name_conflict : success;
+    log.close(); // while another signal does no harm
     if (clesd.has_unfinished_work()) {
         std::_Exit(code); // without waiting for it
     }
@@ -142,19 +186,19 @@ void set_up_signals() {
 int start(int argc, const char* const* argv) {
     const auto parsed = parse_command_line(argc, argv);
     if (const auto* text = std::get_if<std::string>(&parsed)) {
-        print(stdout, *text);
+        tool::write_output(*text);
         return success;
     }
     const auto& wanted = std::get<command_line_options>(parsed);
     auto sources = sources_of(wanted);
     auto setup = load(sources);
+    if (!wanted.print_config && !wanted.check) {
+        return run(std::move(setup), std::move(sources));
+    }
     if (wanted.print_config) {
-        print(stdout, to_yaml(setup));
+        tool::write_output(to_yaml(setup));
     }
-    if (wanted.check) {
-        return check_plugins(setup);
-    }
-    return wanted.print_config ? success : run(std::move(setup), std::move(sources));
+    return wanted.check ? check_start(std::move(setup)) : success;
 }
 
 } // namespace
@@ -168,6 +212,8 @@ int main(int argc, char** argv) {
     set_up_signals();
     try {
         return start(argc, argv);
+    } catch (const tool::output_closed&) {
+        return success;
     } catch (const usage_error& e) {
         return report(std::string{e.what()} + "\nclesd: run clesd --help for the options", wrong_usage);
     } catch (const config_error& e) {

@@ -13,6 +13,7 @@
 #include "perf/support/child_process.hpp"
 #include "perf/support/descriptor.hpp"
 #include "perf/support/pinning.hpp"
+#include "perf/support/process_memory.hpp"
 #include "security/fleet/fleet.hpp"
 #include "security/fleet/fleet_authority.hpp"
 #include "security/fleet/key_directory.hpp"
@@ -20,7 +21,6 @@
 #include "tls/tls_transport.hpp"
 
 #include <boost/asio/io_context.hpp>
-#include <boost/describe/class.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -29,7 +29,6 @@
 #include <cstdlib>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -39,18 +38,9 @@
 #include <utility>
 #include <vector>
 
-#include <malloc.h>
 #include <sys/resource.h>
 
 namespace cles::perf {
-
-/// What the node holds, in bytes.
-struct node_memory {
-    std::uint64_t resident = 0;
-    std::uint64_t allocated = 0; ///< by malloc
-};
-BOOST_DESCRIBE_STRUCT(node_memory, (), (resident, allocated))
-
 namespace {
 
 using steady = std::chrono::steady_clock;
@@ -61,15 +51,6 @@ constexpr double most_resident = 64;         // KiB for each link
 constexpr std::chrono::seconds idle_time{5}; // after which a node has released the buffers of idle links
 
 double seconds_since(steady::time_point begun) { return std::chrono::duration<double>(steady::now() - begun).count(); }
-
-node_memory memory_now() {
-    std::ifstream statm{"/proc/self/statm"};
-    std::uint64_t all = 0;
-    std::uint64_t resident = 0;
-    statm >> all >> resident;
-    const auto heap = ::mallinfo2();
-    return {resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE)), heap.uordblks + heap.hblkhd};
-}
 
 /// A fleet of the node and its members, with a folder for the files of the node.
 class fleet_folder {
@@ -232,9 +213,9 @@ class members_end {
         }
         return seconds_since(begun);
     }
-    node_memory memory() {
+    process_memory memory() {
         const auto text = ask("PULL self:memory id=1");
-        return from_json<node_memory>(text);
+        return from_json<process_memory>(text);
     }
     void stay_idle() { io_.run_for(idle_time); }
 
@@ -285,8 +266,8 @@ class members_end {
     std::size_t answered_ = 0;
 };
 
-bool report(const char* what, std::size_t links, double took, const node_memory& before, const node_memory& after,
-            const node_memory& idle) {
+bool report(const char* what, std::size_t links, double took, const process_memory& before, const process_memory& after,
+            const process_memory& idle) {
     const auto per_link = [&](std::uint64_t with, std::uint64_t without) {
         return (static_cast<double>(with) - static_cast<double>(without)) / 1024 / static_cast<double>(links);
     };

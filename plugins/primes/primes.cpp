@@ -2,6 +2,7 @@
 #include "primes.hpp"
 
 #include <cles/setting_error.hpp>
+#include <cles/types.hpp>
 
 #include "prime_counter.hpp"
 
@@ -137,22 +138,25 @@ void settings::check() const {
 void register_tasks(cles::registrar& to, const settings& wanted) {
     wanted.check();
     const auto limit = wanted.limit.value_or(default_limit);
-    to.on_pull("prime",
-               [limit](const cles::request& asked) {
-                   const auto number = asked.parameter<std::uint64_t>(0);
-                   check(number, limit);
-                   return is_prime(number);
-               },
-               {.description = "Whether a number is prime", .parameters = {"number"}, .idempotent = true});
-    to.on_delegate("primes",
-                   [limit](const cles::request& asked, const cles::responder& answer) { count(asked, answer, limit); },
-                   {.description = "Counts the primes from 'from' up to 'below'", .idempotent = true});
-    to.on_delegate(
+    cles::typed_registrar tasks{to};
+    tasks.on_pull("prime",
+                  [limit](const cles::request& asked) {
+                      const auto number = asked.parameter<std::uint64_t>(0);
+                      check(number, limit);
+                      return is_prime(number);
+                  },
+                  {.description = "Whether a number is prime", .parameters = {"number"}, .idempotent = true});
+    tasks.on_delegate(
+        "primes", [limit](const cles::request& asked, const cles::responder& answer) { count(asked, answer, limit); },
+        {.description = "Counts the primes from 'from' up to 'below'", .idempotent = true},
+        {.body = cles::schema_of<range>(), .result = cles::schema_of<found>()});
+    tasks.on_delegate(
         "primes_in_parts",
         [limit, node = wanted.parts_by.value_or("any")](const cles::request& asked, const cles::responder& answer) {
             divide(asked, answer, limit, node);
         },
-        {.description = "Counts the primes below 'below', in 'parts' that others count", .idempotent = true});
+        {.description = "Counts the primes below 'below', in 'parts' that others count", .idempotent = true},
+        {.body = cles::schema_of<division>(), .result = cles::schema_of<found>()});
 }
 
 } // namespace primes

@@ -22,14 +22,13 @@ void sampler::want(const std::string& noun) {
         return;
     }
     const std::scoped_lock lock{mutex_};
-    if (over_ || !wanted_.emplace(noun, &offered->second).second) {
-        return;
-    }
-    more_wanted_ = true;
-    if (!thread_.joinable()) {
+    if (!over_ && !thread_.joinable()) { // first, because the system may refuse it: then nothing is wanted yet
         thread_ = std::thread{[this] { run(); }};
     }
-    changed_.notify_all();
+    if (!over_ && wanted_.emplace(noun, &offered->second).second) {
+        more_wanted_ = true;
+        changed_.notify_all();
+    }
 }
 
 void sampler::run() {

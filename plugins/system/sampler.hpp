@@ -28,7 +28,8 @@ class sampler {
 
     /// What may be wanted. Before the first `want`.
     void offer(std::string noun, reading read) { offered_.emplace(std::move(noun), std::move(read)); }
-    /// From now on the noun is published, at once the first time. Quick, from any thread.
+    /// From now on the noun is published, at once the first time. Quick, from any thread. \throws std::system_error if
+    /// the system refuses the thread
     void want(const std::string& noun);
 
   private:

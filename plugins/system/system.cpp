@@ -11,6 +11,7 @@
 #include "network.hpp"
 #include "processes.hpp"
 #include "sampler.hpp"
+#include "system_time.hpp"
 #include "utc.hpp"
 
 #include <chrono>
@@ -86,6 +87,7 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
 
     const auto samples = std::make_shared<sampler>(std::chrono::milliseconds{interval});
     const auto meter = std::make_shared<load_meter>();
+    register_system_time(to);
     offer(to, samples, "utc", read_utc, {.description = "Time of day: seconds since 1970, and as text"});
     offer(to, samples, "load", [meter] { return meter->read(); },
           {.description = "How busy the cores are: part of their time (0 to 1), and runnable threads"});

@@ -22,6 +22,7 @@ BOOST_DESCRIBE_STRUCT(settings, (), (interval_ms, processes))
 
 /// Information about the machine, by PULL and BIND, for all applications (paper, section 3.5): `utc`, `load`, `memory`,
 /// `disk`, `network` and `processes`, from the kernel's own files. The structures of those names document the members.
+/// Also `systemTime`, by PULL and DELEGATE (section 3.3).
 void register_tasks(cles::registrar& to, const settings& wanted);
 
 } // namespace sysinfo

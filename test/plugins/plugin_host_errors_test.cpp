@@ -34,12 +34,13 @@ std::ostream& operator<<(std::ostream& out, const fault& f) { return out << f.li
 // The message, without the path before it.
 constexpr std::array faults{
     fault{"bad_tasks", "PULL 'nothing' has no handler"},
+    fault{"bad_types", "BIND 'noun': updates: not a schema of the subset: oneOf: this keyword is not in the subset"},
     fault{"crashes_in_check", "its settings check ends the process by signal 6 (SIGABRT)"},
     fault{"crashes_in_entry", "its entry point ends the process by signal 11 (SIGSEGV)"},
     fault{"describes_nothing", "its entry returns no description"},
     fault{"exits_when_loaded", "its initialization ends the process"},
-    fault{"lacks_start", "its description lacks members of version 1.5 of the plugin ABI"},
-    fault{"newer_minor", "it needs version 1.12 of the plugin ABI, this host has 1.5"},
+    fault{"lacks_start", "its description lacks members of version 1.7 of the plugin ABI"},
+    fault{"newer_minor", "it needs version 1.14 of the plugin ABI, this host has 1.7"},
     fault{"no_entry", "it is not a plugin: it has no function 'cles_plugin_v1'"},
     fault{"other_version", "it was made for version 2 of the plugin ABI, this host has version 1"},
     fault{"refuses", "the device is on fire"},
@@ -52,7 +53,7 @@ constexpr std::array faults{
     fault{"throws_when_loaded", "thrown by a global object"},
     fault{"too_short", "its description is too short"},
     fault{"undefined_symbol", "cles_test_nobody_has_this"},
-    fault{"wrong_major", "it needs version 2.5 of the plugin ABI, this host has 1.5"},
+    fault{"wrong_major", "it needs version 2.7 of the plugin ABI, this host has 1.7"},
 };
 
 struct fixture {

@@ -182,6 +182,15 @@ BOOST_AUTO_TEST_CASE(a_job_on_a_pool_is_answered_where_it_answers_and_stops_when
     BOOST_TEST(c.drops == 1);
 }
 
+BOOST_AUTO_TEST_CASE(the_responder_of_a_job_on_a_pool_is_for_any_thread) {
+    const auto job = jobs.open(responder{std::make_shared<pooled_recorder>()});
+    BOOST_TEST(jobs.find_shared(job).has_value());
+    BOOST_TEST(!jobs.find_shared(open()).has_value()); // it belongs to an executor
+    jobs.finish(job, done);
+    BOOST_TEST(!jobs.find_shared(job).has_value());
+    BOOST_TEST(!jobs.find_shared(0).has_value());
+}
+
 BOOST_AUTO_TEST_CASE(there_are_so_many_jobs_and_no_more) {
     std::vector<std::uint64_t> all;
     for (std::size_t i = 0; i < jobs.max_open; ++i) {

@@ -134,6 +134,51 @@ BOOST_AUTO_TEST_CASE(a_job_that_waits_for_others_is_notified_once_that_the_node_
     BOOST_TEST(client.ask("PULL self:told") == R"({"value":"unavailable"})");
 }
 
+BOOST_FIXTURE_TEST_CASE(a_job_follows_a_noun_and_leaves_the_only_worker_to_others, one_worker) {
+    load("sound.so");
+    int bound = 0;
+    car.on_bind("height", [&](const cles::request&) { ++bound; });
+    auto client = peer();
+    auto other = peer();
+    client.send("DELEGATE self:adds_up/self%3Aheight id=1\n");
+    wait_for([&] { return bound == 1; });
+    for (const int height : {4, 3, 2}) {
+        car.update("height", height);
+        BOOST_TEST(other.ask("PULL self:number") == R"({"value":42})");
+    }
+    car.update("height", 0);
+    BOOST_TEST(client.line() == R"(id=1 {"value":9})");
+    BOOST_TEST(host.figures().answered_twice == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_job_is_told_why_it_cannot_bind) {
+    load("sound.so");
+    auto client = peer();
+    BOOST_TEST(client.ask("DELEGATE self:adds_up/self%3Anothing").starts_with(R"({"error":"no_task")"));
+    BOOST_TEST(client.ask("DELEGATE self:adds_up/nobody%3Aheight").starts_with(R"({"error":"no_target")"));
+    BOOST_TEST(client.ask("DELEGATE self:adds_up_inline/self%3Anothing") ==
+               R"({"error":"failed","message":"car1: a job on the I/O thread has no feeds"})");
+}
+
+BOOST_AUTO_TEST_CASE(a_feed_ends_with_its_job) {
+    load("sound.so");
+    int bound = 0;
+    car.on_bind("height", [&](const cles::request&) { ++bound; });
+    auto client = peer();
+    client.send("DELEGATE self:adds_up/self%3Aheight id=1\n");
+    wait_for([&] { return bound == 1; });
+    client.send("PUSH self:cles/cancel/1 id=2\n");
+    BOOST_TEST(client.line().starts_with(R"(id=1 {"error":"cancelled")"));
+    wait_for([&] { return host.figures().jobs == 0 && pool->load().running == 0; });
+}
+
+BOOST_AUTO_TEST_CASE(a_job_binds_by_the_bare_entry_point_and_bad_handles_do_no_harm) {
+    load("rough.so");
+    car.update("known", 7);
+    BOOST_TEST(peer().ask("DELEGATE self:binds") == R"({"value":true})");
+    BOOST_TEST(host.figures().answered_twice == 0U);
+}
+
 BOOST_AUTO_TEST_CASE(the_systems_nouns_are_pulled_and_bound) {
     load("libcles-system.so", R"({"interval_ms":10})");
     auto client = peer();

@@ -21,6 +21,7 @@
 #include <chrono>
 #include <cmath>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -49,6 +50,18 @@ BOOST_FIXTURE_TEST_SUITE(system_tasks, fixture)
 BOOST_AUTO_TEST_CASE(utc_is_now) {
     const auto now = std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
     BOOST_TEST(std::abs(pull<sysinfo::utc>("utc").seconds - now) < 60);
+}
+
+BOOST_AUTO_TEST_CASE(system_time_is_that_of_the_paper) {
+    using clock = std::chrono::system_clock;
+    for (const std::string command : {"PULL self:systemTime", "PULL self:systemTime/UTC", "DELEGATE self:systemTime",
+                                      "DELEGATE self:systemTime/UTC"}) {
+        const auto pairs = cles::from_json<std::map<std::string, clock::time_point>>(node.request(command));
+        BOOST_TEST(pairs.size() == 1U);
+        BOOST_TEST((std::chrono::abs(pairs.at("systemTime") - clock::now()) < std::chrono::minutes{1}));
+    }
+    BOOST_CHECK_EXCEPTION(node.request("PULL self:systemTime/TAI"), cles::error,
+                          [](const cles::error& e) { return e.code() == cles::errc::bad_request; });
 }
 
 BOOST_AUTO_TEST_CASE(this_machine_makes_sense) {

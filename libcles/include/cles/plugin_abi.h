@@ -19,7 +19,7 @@
  *   `refuse` and `refuse_setting`, which may only be called in `start` and `check`. The host and its functions stay
  *   valid until the process ends, and so does the loaded library.
  * - The handle of a job that has been answered, or that never existed, does no harm: the call does nothing and is
- *   counted.
+ *   counted. Nor does that of a feed that has ended.
  * - No exception may leave a function of the plugin. (The host catches one if the compilers allow it.)
  * - A structure begins with its size as its writer knows it, so that later versions can append members: read none
  *   beyond that size. A change that is not possible in this way changes `abi_major` and the name of the entry point.
@@ -34,7 +34,7 @@ extern "C" {
 #endif
 
 #define CLES_PLUGIN_ABI_MAJOR 1u
-#define CLES_PLUGIN_ABI_MINOR 5u
+#define CLES_PLUGIN_ABI_MINOR 7u
 /* The name of the entry point, as text. */
 #define CLES_PLUGIN_ENTRY "cles_plugin_v1"
 
@@ -121,11 +121,15 @@ typedef struct cles_task {
      */
     void (*start)(void* user, cles_job job, const cles_request* request);
     void* user; /* passed to `start` */
+    /* Since 1.6: what the task tells about its types, a JSON object with the members `parameters`, `body`, `result` and
+     * `updates` as far as they are known, each a JSON Schema (docs/protocol.md, "Types"); may be empty. An older host
+     * ignores it. */
+    cles_text types;
 } cles_task;
 
 /* What `add_task` returns. */
 #define CLES_ADDED 0
-#define CLES_BAD_TASK 1    /* its name, verb, flags or size */
+#define CLES_BAD_TASK 1    /* its name, verb, flags, types or size */
 #define CLES_TASK_EXISTS 2 /* this verb and name already has a handler, of this plugin or another */
 #define CLES_TOO_LATE 3    /* `start` has ended */
 
@@ -154,6 +158,53 @@ typedef struct cles_ask {
     void (*progress)(void* user, double fraction, cles_text json);
     void* user;
 } cles_ask;
+
+/* Since 1.7: a feed of a job. Never 0, and not reused while the process runs. */
+typedef uint64_t cles_feed;
+
+/* The kinds of events of a feed. */
+#define CLES_FEED_CURRENT 0u /* the publisher's last value when the binding was made */
+#define CLES_FEED_UPDATE 1u
+#define CLES_FEED_GAP 2u     /* `missed` updates were not received */
+#define CLES_FEED_LOST 3u    /* the publisher was lost, for the reason in `text`; the host binds again by itself */
+#define CLES_FEED_REBOUND 4u /* the publisher is back */
+
+/* An event of a feed; borrowed until the callback returns. */
+typedef struct cles_event {
+    uint32_t size; /* of this structure */
+    uint32_t kind;
+    cles_text json;      /* of CURRENT and UPDATE: valid JSON, an object or an array; otherwise {} */
+    cles_text publisher; /* the publishing node's name; empty if not known */
+    uint64_t seq;        /* of UPDATE: its sequence number */
+    uint64_t missed;     /* of GAP */
+    cles_text text;      /* of LOST */
+    int64_t waited_ns;   /* for a worker, since the job could have had it */
+} cles_event;
+
+/* How a job binds. */
+typedef struct cles_bind {
+    uint32_t size; /* of this structure */
+    /* How many updates wait, at the publisher while the link is slow, and at this node until the job asks for them.
+     * Beyond that, the oldest are dropped, and told as a gap. 0: 64; 65536 at most. */
+    uint32_t keep;
+    int64_t every_ms;    /* the minimum interval between updates; the newest is sent. 0: every update */
+    int64_t deadline_ms; /* for the publisher's reply; 0: 5 s */
+    cles_text at;        /* the URL to send it to, instead of looking up the name; may be empty */
+} cles_bind;
+
+/* Receives the next event of a feed. */
+typedef struct cles_next {
+    uint32_t size; /* of this structure */
+    uint32_t reserved;
+    /*
+     * Called once, on a thread of the host, and never inside `next`; after `start` of the job and all its earlier
+     * callbacks have returned. `code` is empty if there is an event. Otherwise the feed has ended, `event` is null,
+     * and `code` is the error's name on the wire, with a message: the publisher's, or "cancelled" after `unbind` and
+     * the end of the job.
+     */
+    void (*event)(void* user, cles_text code, cles_text message, const cles_event* event);
+    void* user;
+} cles_next;
 
 /* The functions of the host. Each plugin gets its own structure, and passes it back as the first argument. */
 typedef struct cles_host {
@@ -196,6 +247,17 @@ typedef struct cles_host {
     /* Gives the reason why `start` or `check` is about to fail, and the setting that causes it, such as "limit" or
      * "cameras[2].rate" (empty: the settings as a whole). The host reports the line of the setting. */
     void (*refuse_setting)(const struct cles_host* host, cles_text key, cles_text why);
+
+    /* Since 1.7. */
+    /* Binds a noun, such as "car0:speed", on behalf of a job, with the rights of this node. Whether that succeeds,
+     * `next` tells. The feed ends with the job. It has to be unbound, unless `next` has told that it has ended. A job
+     * has 64 feeds at most; those of a task that is CLES_TASK_INLINE_OK have none. */
+    cles_feed (*bind)(const struct cles_host* host, cles_job job, cles_text noun, const cles_bind* how);
+    /* Asks for the next event. No worker waits for it: return, and continue in the callback. Nothing is delivered that
+     * has not been asked for; what comes meanwhile waits (`cles_bind.keep`). One call at a time for each feed. */
+    void (*next)(const struct cles_host* host, cles_feed feed, const cles_next* next);
+    /* Ends a feed. A call of `next` that waits gets "cancelled". */
+    void (*unbind)(const struct cles_host* host, cles_feed feed);
 } cles_host;
 
 /* The result of the entry point; it must stay valid. */

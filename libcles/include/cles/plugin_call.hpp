@@ -3,6 +3,7 @@
 
 #include <cles/chrono.hpp>
 #include <cles/error.hpp>
+#include <cles/job_feed.hpp>
 #include <cles/plugin_text.hpp>
 #include <cles/responder.hpp>
 
@@ -18,6 +19,22 @@
 /// The plugin's side of a job. Not for applications.
 
 namespace cles::detail {
+
+/// A feed of a job inside a plugin: its handle.
+class plugin_feed final : public job_feed_control {
+  public:
+    plugin_feed(const cles_host& host, cles_job job, cles_feed feed) noexcept : host_(host), job_(job), feed_(feed) {}
+
+    void next(event_callback taken) override;
+    void close() noexcept override { host_.unbind(&host_, feed_); }
+
+  private:
+    struct awaited; // a call of `next`
+
+    const cles_host& host_;
+    cles_job job_;
+    cles_feed feed_;
+};
 
 /// The implementation of a responder inside a plugin: the job's handle. Destroying it fails the job if nothing has been
 /// replied. May be used on any thread, because the host's functions may.
@@ -88,6 +105,26 @@ class plugin_call final : public call_control {
         host_.delegate(&host_, job_, abi_text(command), &crossing);
     }
 
+    std::shared_ptr<job_feed_control> bind(job_feed_maker /*make*/, std::string_view noun,
+                                           const bind_options& options) override {
+        constexpr std::uint32_t first_minor = 7;
+        if (host_.abi_minor < first_minor) {
+            throw error(errc::failed, "this host has no feeds for jobs, which came with version 1.7 of the plugin ABI");
+        }
+        if (options.multicast_ || !options.at_node_.empty()) { // the interface has no place for it
+            throw error(errc::invalid_option, "a plugin cannot bind by multicast, or state which node may answer");
+        }
+        if (options.is_on_behalf_) { // it would be bound with the rights of the node
+            throw error(errc::invalid_option, "a plugin cannot bind on behalf of a member");
+        }
+        const cles_bind crossing{.size = sizeof(cles_bind),
+                                 .keep = options.keep_,
+                                 .every_ms = options.every_.count(),
+                                 .deadline_ms = options.deadline_.count(),
+                                 .at = abi_text(options.at_)};
+        return std::make_shared<plugin_feed>(host_, job_, host_.bind(&host_, job_, abi_text(noun), &crossing));
+    }
+
     [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
 
   private:
@@ -120,5 +157,39 @@ class plugin_call final : public call_control {
     cles_job job_;
     std::atomic<bool> answered_{false};
 };
+
+struct plugin_feed::awaited {
+    static void take(void* user, cles_text code, cles_text message, const cles_event* event) {
+        const std::unique_ptr<awaited> self{static_cast<awaited*>(user)};
+        try {
+            if (code.size != 0) {
+                self->taken(errc_from_wire(view_of(code)), {.text = view_of(message)});
+                return;
+            }
+            const auto what = detail::known_part(event);
+            self->taken({}, {.kind = static_cast<feed_event>(what.kind),
+                             .json = view_of(what.json),
+                             .publisher = view_of(what.publisher),
+                             .seq = what.seq,
+                             .missed = what.missed,
+                             .text = view_of(what.text),
+                             .waited = std::chrono::nanoseconds{what.waited_ns}});
+        } catch (...) {
+            plugin_call job{self->host, self->job};
+            fail_with(job, std::current_exception());
+        }
+    }
+
+    const cles_host& host;
+    cles_job job;
+    event_callback taken;
+};
+
+inline void plugin_feed::next(event_callback taken) {
+    auto owned = std::make_unique<awaited>(awaited{host_, job_, std::move(taken)});
+    const cles_next crossing{.size = sizeof(cles_next), .reserved = 0, .event = &awaited::take, .user = owned.get()};
+    static_cast<void>(owned.release()); // freed by `take`, which may run before `next` returns
+    host_.next(&host_, feed_, &crossing);
+}
 
 } // namespace cles::detail

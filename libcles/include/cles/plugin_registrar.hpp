@@ -148,7 +148,8 @@ class plugin_registrar final : public registrar {
                      (info.must_be_signed ? CLES_TASK_SIGNED : 0U) | (info.local ? CLES_TASK_LOCAL : 0U),
             .reserved = 0,
             .start = handled ? &plugin_task::start : nullptr,
-            .user = tasks_.back().get()};
+            .user = tasks_.back().get(),
+            .types = abi_text(info.types)};
         switch (host_.add_task(&host_, &crossing)) {
         case CLES_ADDED: return;
         case CLES_TASK_EXISTS: throw error(errc::already_registered, what);

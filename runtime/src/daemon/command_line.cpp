@@ -3,10 +3,13 @@
 
 #include <cles/version.hpp>
 
+#include "output/help_formatter.hpp"
+
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
+#include <memory>
 #include <utility>
 
 namespace cles::runtime {
@@ -24,7 +27,7 @@ constexpr auto footer =
     "  clesd                           # with the defaults: a node on loopback, without tasks\n"
     "  clesd --config clesd.yaml --check\n"
     "  clesd --node sat1 --listen tcp://127.0.0.1:25370 --print-config\n"
-    "  clesd --keys /etc/cles/keys";
+    "  clesd --keys /var/lib/cles/keys";
 
 // "--listen" of "-l,--listen"
 std::string last_name_of(const std::string& names) { return names.substr(names.rfind("--")); }
@@ -35,6 +38,7 @@ std::variant<command_line_options, std::string> parse_command_line(int argc, con
     command_line_options wanted;
     bool allow_clash = false;
     CLI::App app{about, "clesd"};
+    app.formatter(std::make_shared<tool::help_formatter>());
     app.footer(footer);
     app.set_version_flag("--version", "clesd " + std::string{cles::version});
     // Overrides a setting of the file.
@@ -55,7 +59,7 @@ std::variant<command_line_options, std::string> parse_command_line(int argc, con
            },
            "The configuration file")
         ->type_name("FILE");
-    app.add_flag("--check", wanted.check, "Only check whether the configuration can be used");
+    app.add_flag("--check", wanted.check, "Only check whether it could start now with the configuration");
     app.add_flag("--print-config", wanted.print_config,
                  "Only print the configuration, and where each value comes from");
     add_setting("node", "--name,--node", "NAME", "The name of the node");

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "daemon/daemon.hpp"
 
-#include <cles/tracing.hpp>
-
 #include "config/config.hpp"
 #include "config/config_file.hpp"
 #include "config/config_values.hpp"
-#include "daemon/service_parts.hpp"
+#include "daemon/service_setup.hpp"
 #include "jobs/current_trace.hpp"
 #include "jobs/pooled_registrar.hpp"
 #include "plugins/plugin_library.hpp"
@@ -31,36 +29,19 @@ using std::chrono::steady_clock;
 constexpr int exit_configuration_error = 2;
 constexpr std::chrono::seconds start_limit{10};
 
-service_options options_of(const config& setup, const daemon_log& log) {
-    service_options options{.name = setup.node};
-    options.pool = setup.pool;
-    options.listen = setup.listen;
-    options.peers = setup.peers;
-    options.insecure = setup.insecure;
-    options.security = security_of(setup);
-    options.federation = federation_of(setup);
-    options.networks = setup.networks;
-    options.multicast = setup.multicast;
-    options.limits = setup.limits;
-    options.log = log.sink();
-    options.routing = cles::routing();
-    options.tracing = cles::tracing();
-    options.gossip = cles::gossip(setup.seeds, setup.links); // without any, this node may be the seed of others
-    return options;
-}
-
-pool_options pool_options_of(const config& setup, const daemon_log& log) {
+pool_options pool_options_of(const config& setup, daemon_log& log) {
     pool_options options;
     options.workers = setup.workers;
     options.queue = setup.queue;
     options.replacements = setup.replacements;
     options.grace = std::chrono::ceil<milliseconds>(setup.stuck_after);
+    options.max_wait = 100ms;
     options.check_interval = 250ms;
     options.log = log.sink();
     return options;
 }
 
-plugin_host_options host_options_of(const config& setup, const daemon_log& log) {
+plugin_host_options host_options_of(const config& setup, daemon_log& log) {
     plugin_host_options options{.node = setup.node};
     options.rules = plugin_rules_of(setup);
     options.trial = 0ms; // they were tried before threads were started
@@ -105,7 +86,7 @@ daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources
     : io_(io), setup_(std::move(setup)), sources_(std::move(sources)), log_(log), service_manager_(manager),
       service_(io,
                [this] {
-                   auto options = options_of(setup_, log_);
+                   auto options = options_of(setup_, log_.sink());
                    options.load = [this] { return has_pool_ ? pool_.load() : node_load{}; };
                    if (!setup_.allow_clash) {
                        options.on_name_taken = [this](std::string_view where) { on_name_conflict(where); };
@@ -114,7 +95,7 @@ daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources
                    return options;
                }()),
       pool_(service_, pool_options_of(setup_, log)), plugins_(host_options_of(setup_, log)),
-      signals_(io, SIGTERM, SIGINT, SIGHUP) {
+      signals_(io, SIGTERM, SIGINT, SIGHUP), heartbeat_(io), memory_timer_(io) {
     wait_for_signal();
     has_pool_ = true;
     if (setup_.sharing) {
@@ -126,6 +107,13 @@ daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources
         end_isolated(0ms);
         service_.stop(); // while everything that it uses exists
         throw;
+    }
+    if (service_manager_.heartbeat().count() != 0) {
+        wait_for_heartbeat();
+    }
+    if (setup_.real_time == 0) { // else all memory is locked, and page faults are to be avoided
+        idle_memory_.emplace(usage_of_process());
+        wait_for_idle_memory();
     }
 }
 
@@ -160,6 +148,7 @@ void daemon::load_plugin(std::size_t index) {
         load_isolated(index, path);
         return;
     }
+    log_.flush(); // the guard may end the process
     {
         const plugin_start_guard guard{"clesd: " + setup_.location_of("plugins[" + std::to_string(index) + "].path") +
                                            ": " + path,
@@ -181,6 +170,32 @@ void daemon::load_isolated(std::size_t index, const std::string& path) {
                         .max_line = 2 * setup_.limits.line + 65536});
     isolated->start();
     isolated_.push_back({index, isolated});
+}
+
+// On the context, so that a daemon whose context is stuck is started again. What cannot be sent now is sent with the
+// next one.
+void daemon::wait_for_heartbeat() {
+    heartbeat_.expires_after(service_manager_.heartbeat());
+    heartbeat_.async_wait([this](boost::system::error_code code) {
+        if (!code) {
+            static_cast<void>(service_manager_.alive());
+            wait_for_heartbeat();
+        }
+    });
+}
+
+void daemon::wait_for_idle_memory() {
+    memory_timer_.expires_after(idle_memory::interval);
+    memory_timer_.async_wait([this](boost::system::error_code code) {
+        if (code) {
+            return;
+        }
+        if (idle_memory_->is_time(usage_of_process())) {
+            return_unused_memory();
+            idle_memory_->returned(usage_of_process());
+        }
+        wait_for_idle_memory();
+    });
 }
 
 void daemon::write_metrics(json_writer& w) const {
@@ -292,6 +307,8 @@ void daemon::finish() {
         unfinished_work_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0 || unfinished_work_;
     }
     signals_.cancel();
+    heartbeat_.cancel();
+    memory_timer_.cancel();
     log_.info("stopped");
     // A job that does not end is still watched, and keeps the context running.
     boost::asio::post(io_, [this] { io_.stop(); });

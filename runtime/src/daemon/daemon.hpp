@@ -6,6 +6,7 @@
 #include "config/config.hpp"
 #include "config/config_sources.hpp"
 #include "daemon/daemon_log.hpp"
+#include "daemon/idle_memory.hpp"
 #include "daemon/service_manager.hpp"
 #include "isolation/isolated_plugin.hpp"
 #include "jobs/job_pool.hpp"
@@ -13,10 +14,12 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
 
 #include <chrono>
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -27,7 +30,8 @@ namespace cles::runtime {
 ///
 /// To be used on the thread that runs the context. After SIGTERM or SIGINT it admits no more jobs, lets the running
 /// ones end within `config::drain`, and stops the context; a second signal stops it at once. It also stops if another
-/// live node had its name first, unless `config::allow_clash` is set.
+/// live node had its name first, unless `config::allow_clash` is set. While the context runs, the service manager is
+/// told so.
 class daemon {
   public:
     /// Loads the plugins and listens. \param log, manager have to outlive this
@@ -52,6 +56,8 @@ class daemon {
     void retry_isolated(const config* fresh);
     void write_metrics(json_writer& w) const;
     void wait_for_signal();
+    void wait_for_heartbeat();
+    void wait_for_idle_memory();
     void stop(int signal);
     void on_name_conflict(std::string_view where);
     void drain();
@@ -76,6 +82,9 @@ class daemon {
     };
     std::vector<isolated_entry> isolated_;
     boost::asio::signal_set signals_;
+    boost::asio::steady_timer heartbeat_;
+    boost::asio::steady_timer memory_timer_;
+    std::optional<idle_memory> idle_memory_; // nothing: its memory stays
     std::chrono::steady_clock::time_point stop_begun_;
     bool stopping_ = false;
     bool signalled_ = false;

@@ -4,13 +4,13 @@
 #include <cles/json_writer.hpp>
 #include <cles/printable.hpp>
 
-#include <spdlog/logger.h>
-#include <spdlog/sinks/ansicolor_sink.h>
+#include "output/log_line.hpp"
+#include "output/terminal.hpp"
 
-#include <cstdlib>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <utility>
-
-#include <unistd.h>
 
 namespace cles::runtime {
 std::string format_text(std::string_view node, const log_entry& entry) {
@@ -48,55 +48,39 @@ std::string format_json(std::string_view node, const log_entry& entry) {
     return printable(std::string_view{out}.substr(1, out.size() - 2));
 }
 
-namespace {
+struct daemon_log::style {
+    style(std::string of, log_config how) : node(std::move(of)), level(how.level), format(how.format) {}
 
-constexpr auto text_pattern = "%Y-%m-%dT%H:%M:%S.%e%z %^%-7l%$ %v";
-constexpr auto json_pattern = R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l",%v})";
-
-spdlog::level::level_enum spdlog_level(log_level level) {
-    switch (level) {
-    case log_level::debug: return spdlog::level::debug;
-    case log_level::info: return spdlog::level::info;
-    case log_level::warning: return spdlog::level::warn;
-    case log_level::error: break;
+    [[nodiscard]] std::string line(log_level of, const log_entry& entry) const {
+        const auto now = std::chrono::system_clock::now();
+        return format == log_format::json ? tool::json_log_line(now, of, format_json(node, entry))
+                                          : tool::log_line(now, of, format_text(node, entry), coloured);
     }
-    return spdlog::level::err;
-}
 
-spdlog::color_mode stderr_color_mode() {
-    const char* none = std::getenv("NO_COLOR");
-    const bool wanted = (none == nullptr || *none == '\0') && ::isatty(STDERR_FILENO) == 1;
-    return wanted ? spdlog::color_mode::automatic : spdlog::color_mode::never;
-}
-
-} // namespace
+    const std::string node;
+    const bool coloured = tool::has_colours(tool::stream::err);
+    std::atomic<log_level> level;
+    std::atomic<log_format> format;
+};
 
 daemon_log::daemon_log(std::string node, log_config how)
-    : node_(std::move(node)),
-      logger_(std::make_shared<spdlog::logger>(
-          "clesd", std::make_shared<spdlog::sinks::ansicolor_stderr_sink_st>(stderr_color_mode()))),
-      format_(how.format) {
-    logger_->flush_on(spdlog::level::debug);
-    set(how);
-}
+    : style_(std::make_shared<style>(std::move(node), how)),
+      writer_(tool::stream::err, [style = style_](std::uint64_t count) {
+          return style->line(log_level::warning, tool::dropped_text(count));
+      }) {}
 
 void daemon_log::set(log_config how) {
-    const std::scoped_lock lock{mutex_};
-    logger_->set_pattern(how.format == log_format::json ? json_pattern : text_pattern);
-    logger_->set_level(spdlog_level(how.level));
-    format_ = how.format;
+    style_->format = how.format;
+    style_->level = how.level;
 }
 
-void daemon_log::write(log_level level, const log_entry& entry) const {
-    const auto native = spdlog_level(level);
-    if (logger_->should_log(native)) {
-        const std::scoped_lock lock{mutex_};
-        const auto line = format_ == log_format::json ? format_json(node_, entry) : format_text(node_, entry);
-        logger_->log(native, spdlog::string_view_t{line});
+void daemon_log::write(log_level level, const log_entry& entry) {
+    if (level >= style_->level) {
+        writer_.write(style_->line(level, entry));
     }
 }
 
-log_sink daemon_log::sink() const {
+log_sink daemon_log::sink() {
     return [this](log_level level, const log_entry& entry) { write(level, entry); };
 }
 

@@ -4,15 +4,11 @@
 #include <cles/log.hpp>
 
 #include "config/config.hpp"
+#include "output/log_writer.hpp"
 
 #include <memory>
-#include <mutex>
 #include <string>
 #include <string_view>
-
-namespace spdlog {
-class logger;
-} // namespace spdlog
 
 namespace cles::runtime {
 
@@ -25,27 +21,32 @@ std::string format_text(std::string_view node, const log_entry& entry);
 std::string format_json(std::string_view node, const log_entry& entry);
 
 /// The daemon's log, on stderr: text, in colour on a terminal (unless NO_COLOR is set), or JSON, one object per line.
-/// May be used from any thread.
+/// Never waits for its reader, and drops lines instead. May be used from any thread.
 class daemon_log {
   public:
     daemon_log(std::string node, log_config how);
 
     /// Changes level and format.
     void set(log_config how);
-    void write(log_level level, const log_entry& entry) const;
+    void write(log_level level, const log_entry& entry);
 
-    void info(std::string_view text) const { write(log_level::info, text); }
-    void warning(std::string_view text) const { write(log_level::warning, text); }
-    void error(std::string_view text) const { write(log_level::error, text); }
+    void info(std::string_view text) { write(log_level::info, text); }
+    void warning(std::string_view text) { write(log_level::warning, text); }
+    void error(std::string_view text) { write(log_level::error, text); }
 
     /// For functions that take a sink; the log has to outlive it.
-    [[nodiscard]] log_sink sink() const;
+    [[nodiscard]] log_sink sink();
+    /// Waits until its lines are written, if somebody reads them: before other output, and before what may end the
+    /// process.
+    void flush() { writer_.flush(); }
+    /// Before the process ends without destructors: as they do, writes what is left, if somebody reads it.
+    void close() { writer_.close(); }
 
   private:
-    const std::string node_;
-    const std::shared_ptr<spdlog::logger> logger_;
-    mutable std::mutex mutex_; // so that a line is formatted and written in one format
-    log_format format_;
+    struct style;
+
+    const std::shared_ptr<style> style_; // the writer's thread uses it, too
+    tool::log_writer writer_;
 };
 
 } // namespace cles::runtime

@@ -2,7 +2,10 @@
 #include "daemon/service_manager.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
+#include <optional>
+#include <system_error>
 
 #include <sys/socket.h>
 #include <sys/un.h>
@@ -41,6 +44,25 @@ bool service_manager::notify(std::string_view state) const {
 bool service_manager::reloading(std::chrono::steady_clock::time_point now) const {
     const auto since = std::chrono::duration_cast<std::chrono::microseconds>(now.time_since_epoch());
     return notify("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(since.count()));
+}
+
+namespace {
+
+std::optional<std::int64_t> number(std::string_view text) {
+    std::int64_t value = 0;
+    const auto [end, failed] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return failed == std::errc{} && end == text.data() + text.size() && value > 0 ? std::optional{value} : std::nullopt;
+}
+
+} // namespace
+
+std::chrono::microseconds watchdog_of(const char* microseconds, const char* process, std::int64_t self) {
+    const auto limit = microseconds == nullptr ? std::nullopt : number(microseconds);
+    if (!limit || (process != nullptr && number(process) != self)) {
+        return {};
+    }
+    constexpr std::chrono::microseconds longest = std::chrono::hours{24};
+    return std::min(longest, std::chrono::microseconds{*limit});
 }
 
 } // namespace cles::runtime

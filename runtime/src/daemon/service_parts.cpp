@@ -27,11 +27,15 @@ detail::service_part security_of(const config& setup) {
     security::forbid_core_dumps();
     security_options options{.directory = setup.security.keys};
     for (const auto& [user, member] : setup.security.local_users) {
+        const auto where = setup.location_of("security.local_users." + user);
         const auto id = security::id_of_user(user);
         if (!id) {
-            throw config_error(setup.location_of("security.local_users." + user), "there is no user '" + user + "'");
+            throw config_error(where, "there is no user '" + user + "'");
         }
-        options.local_users.emplace(*id, member);
+        // By its name and by its id.
+        if (const auto [at, is_new] = options.local_users.emplace(*id, member); !is_new && at->second != member) {
+            throw config_error(where, "that user is " + at->second + " already");
+        }
     }
     try {
         auto made = secured(std::move(options));

@@ -51,8 +51,9 @@ std::uint64_t stack_of_thread() {
 }
 
 // The whole stack of a thread counts as data; those of the daemon's threads are not the plugin's. Memory that is only
-// reserved does not count as data, but does count as address space: glibc reserves 64 MiB for each thread's heap. The
-// second limit is for mappings that are shared, which are no data.
+// reserved does not count as data, but does count as address space: glibc reserves 64 MiB for each thread's heap.
+// Memory that is shared is no data. The filter of system calls refuses it; where there is none, the second limit bounds
+// it.
 void limit_memory(std::uint64_t memory, std::size_t threads) {
     constexpr std::uint64_t heap_of_thread = 64U << 20U;
     constexpr std::uint64_t libraries = 512U << 20U;
@@ -100,7 +101,8 @@ file_access files_of(const isolation_limits& to, const std::filesystem::path& pl
                                 "/etc/group",
                                 "/dev/random",
                                 "/dev/urandom"},
-            .system_writable = {"/dev/null", "/dev/zero", "/dev/full"},
+            // Not /dev/zero: mapped, it is shared memory.
+            .system_writable = {"/dev/null", "/dev/full"},
             .readable = to.read,
             .writable = to.write};
 }
@@ -124,13 +126,17 @@ confinement_report confine(const isolation_limits& to, std::size_t threads, cons
     if (files.version > 0) {
         done.in_force += ", files by Landlock " + std::to_string(files.version);
     } else {
-        done.missing.emplace_back("it can use all files of the daemon's user, because the kernel has no Landlock");
+        done.missing.emplace_back(
+            "it can use all files of the daemon's user, and /dev/zero as memory that its limit does "
+            "not count, because the kernel has no Landlock");
     }
     constexpr int limits_truncation = 3;
     if (filter_syscalls(files.version >= limits_truncation)) {
         done.in_force += ", a filter of system calls";
     } else {
-        done.missing.emplace_back("it can use all system calls, because the kernel has no filter for this processor");
+        done.missing.emplace_back(
+            "it can use all system calls, and more memory than its limit if it shares it, because "
+            "the kernel has no filter for this processor");
     }
     const auto report_missing = [&](const std::vector<std::string>& paths, const char* key) {
         for (const auto& path : paths) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "isolation/isolated_plugin.hpp"
 
+#include <cles/schema.hpp>
+
 #include "jobs/pooled_registrar.hpp"
 #include "plugins/plugin_error.hpp"
 
@@ -265,6 +267,9 @@ void isolated_plugin::offer(const std::vector<offered_task>& tasks) {
             continue;
         }
         registration task{.verb = *verb, .task = each.task, .info = each.info};
+        if (!task.info.types.empty()) { // the other process is not trusted to tell schemas
+            task.info.types = task_types(read_task_types(task.info.types));
+        }
         if (each.handled) {
             task.async = [self = shared_from_this()](const request& what, const responder& answer) {
                 self->run(what, answer);

@@ -8,6 +8,7 @@
 
 #include <boost/describe/class.hpp>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -20,7 +21,7 @@
 namespace cles {
 
 // Without `inline_ok`: a handler in another process never runs on the daemon's I/O thread.
-BOOST_DESCRIBE_STRUCT(task_info, (), (description, parameters, idempotent, local, must_be_signed))
+BOOST_DESCRIBE_STRUCT(task_info, (), (description, parameters, idempotent, local, must_be_signed, types))
 
 } // namespace cles
 
@@ -88,5 +89,20 @@ struct ask_message {
     bool progress = false;
 };
 BOOST_DESCRIBE_STRUCT(ask_message, (), (command, at, urgent, hops, deadline_ms, progress))
+
+/// `PUSH self:cles/bind/<id>/<feed>`, from the plugin's process: a binding of a job. `next/<id>/<feed>/<ticket>` asks
+/// for an event of it, which is answered as an `ask` is, and `unbind/<id>/<feed>` ends it.
+struct bind_message {
+    std::string noun;
+    std::string at;
+    std::uint32_t keep = 0;
+    std::int64_t every_ms = 0;
+    std::uint32_t hops = 8;
+    std::int64_t deadline_ms = 0;
+};
+BOOST_DESCRIBE_STRUCT(bind_message, (), (noun, at, keep, every_ms, hops, deadline_ms))
+
+/// The kinds of events in lines, in the order of `feed_event`.
+inline constexpr std::array<std::string_view, 5> event_names{"current", "update", "gap", "lost", "rebound"};
 
 } // namespace cles::runtime

@@ -28,7 +28,8 @@ constexpr std::size_t max_control_read = 65536;
 // What the process may leave unread. It reads at once, unless it has been stopped.
 constexpr std::size_t max_pending = 64U << 20U;
 constexpr std::size_t max_output_line = 1000;
-constexpr std::size_t max_asks = 4096; // requests that its jobs may wait for
+constexpr std::size_t max_asks = 4096; // requests and events that its jobs may wait for
+constexpr std::size_t max_feeds = 256; // of a job, of which the service binds fewer
 // How long the process may take to end after it has closed a connection.
 constexpr std::chrono::milliseconds end_time{100};
 
@@ -577,6 +578,11 @@ void plugin_session::on_reply(const wire_line& line) {
 
 namespace {
 
+std::string_view wire_name_of(boost::system::error_code code) noexcept {
+    const bool ours = code.category() == error_category();
+    return wire_name(code == errc::stopped ? errc::unavailable : ours ? static_cast<errc>(code.value()) : errc::failed);
+}
+
 template <class T>
 T body_of(const wire_line& line) {
     T read{};
@@ -595,6 +601,12 @@ void plugin_session::on_request(const wire_line& line) {
         events_.publish(line.parameters[1], line.body);
     } else if (what == "ask") {
         ask(line);
+    } else if (what == "bind") {
+        bind(line);
+    } else if (what == "next") {
+        next(line);
+    } else if (what == "unbind") {
+        unbind(line);
     } else if (what == "log") {
         const auto entry = body_of<log_message>(line);
         const auto level = static_cast<log_level>(std::min<std::uint32_t>(entry.level, 3));
@@ -625,8 +637,7 @@ void plugin_session::ask(const wire_line& line) {
         wire_line_writer reply{verb::push, control_task};
         reply.parameter("answered").parameter(ticket);
         if (code) {
-            const auto known = code.category() == error_category() ? static_cast<errc>(code.value()) : errc::failed;
-            reply.adverb("code", wire_name(known)).adverb("message", message);
+            reply.adverb("code", wire_name_of(code)).adverb("message", message);
         }
         const auto text = reply.body(json.empty() ? std::string_view{"{}"} : json);
         by ? self->resume(by, text) : self->say(text);
@@ -636,12 +647,10 @@ void plugin_session::ask(const wire_line& line) {
         answered(nullptr, errc::cancelled, "{}", "the requester of the job no longer waits");
         return;
     }
-    if (asks_.fetch_add(1) >= max_asks) {
-        --asks_;
+    if (!begin_wait(*by)) {
         answered(nullptr, errc::busy, "{}", "too many requests at once");
         return;
     }
-    ++by->waits;
     call_options options;
     options.urgent(wanted.urgent).at(wanted.at).hops(wanted.hops);
     options.deadline(std::chrono::milliseconds{wanted.deadline_ms});
@@ -665,6 +674,78 @@ void plugin_session::ask(const wire_line& line) {
                                 --self->asks_;
                             }
                         });
+}
+
+// Whether the job may wait for one thing more.
+bool plugin_session::begin_wait(job& by) {
+    if (asks_.fetch_add(1) >= max_asks) {
+        --asks_;
+        return false;
+    }
+    ++by.waits;
+    return true;
+}
+
+// Why it cannot be bound, `next` tells.
+void plugin_session::bind(const wire_line& line) {
+    const auto wanted = body_of<bind_message>(line);
+    const auto by = find(line.number_at(1));
+    if (!by || by->feeds.size() >= max_feeds) {
+        return;
+    }
+    bind_options options;
+    options.at(wanted.at).keep(wanted.keep).every(std::chrono::milliseconds{wanted.every_ms});
+    options.deadline(std::chrono::milliseconds{wanted.deadline_ms}).hops(wanted.hops);
+    by->feeds.insert_or_assign(line.number_at(2), by->answer.bind(wanted.noun, options));
+}
+
+// An event continues the job on a worker, as an answer does. So the process has one of each feed at most.
+void plugin_session::next(const wire_line& line) {
+    const auto ticket = line.number_at(3);
+    const auto by = find(line.number_at(1));
+    job_feed feed;
+    if (by) {
+        const auto found = by->feeds.find(line.number_at(2));
+        feed = found == by->feeds.end() ? job_feed{} : found->second;
+    }
+    if (!feed.is_open()) {
+        tell(nullptr, ticket, errc::cancelled, {.text = "the feed is closed"});
+        return;
+    }
+    if (!begin_wait(*by)) {
+        tell(nullptr, ticket, errc::busy, {.text = "too many requests at once"});
+        return;
+    }
+    feed.next([weak = weak_from_this(), by, ticket](boost::system::error_code code, const job_event& what) {
+        if (const auto self = weak.lock()) {
+            self->tell(by, ticket, code, what);
+            --self->asks_;
+        }
+    });
+}
+
+void plugin_session::unbind(const wire_line& line) {
+    if (const auto by = find(line.number_at(1))) {
+        by->feeds.erase(line.number_at(2));
+    }
+}
+
+// \param by continues on this worker; null: it has not waited
+void plugin_session::tell(const std::shared_ptr<job>& by, std::uint64_t ticket, boost::system::error_code code,
+                          const job_event& what) {
+    wire_line_writer line{verb::push, control_task};
+    line.parameter("answered").parameter(ticket);
+    if (code) {
+        line.adverb("code", wire_name_of(code));
+    } else {
+        line.adverb("event", event_names[static_cast<std::size_t>(what.kind)]);
+        line.adverb("publisher", what.publisher);
+        line.adverb("seq", static_cast<std::int64_t>(what.seq))
+            .adverb("missed", static_cast<std::int64_t>(what.missed));
+        line.adverb("waited", std::int64_t{what.waited.count()});
+    }
+    const auto text = line.adverb("message", what.text).body(what.json);
+    by ? resume(by, text) : say(text);
 }
 
 // -- the end -------------------------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/job_feed.hpp>
 #include <cles/limits.hpp>
 #include <cles/log.hpp>
 #include <cles/request.hpp>
@@ -101,8 +102,9 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
         std::string label;               // PULL 'speed'
         std::atomic<time_point> due;     // by when it should have ended
         std::atomic<bool> on_lane{true}; // its worker answers it if the process ends
-        std::atomic<int> waits{0};       // for the answers to requests that it has sent
-        bool progress_unwanted = false;  // used on the executor
+        std::atomic<int> waits{0};       // for the answers to requests that it has sent, and for events
+        bool progress_unwanted = false;  // used on the executor, as is the next
+        boost::unordered_flat_map<std::uint64_t, job_feed> feeds{}; // by the numbers that the process has given them
     };
     struct lane {
         int socket = -1;
@@ -140,6 +142,12 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
     void on_reply(const wire_line& line);
     void on_request(const wire_line& line);
     void ask(const wire_line& line);
+    void bind(const wire_line& line);
+    void next(const wire_line& line);
+    void unbind(const wire_line& line);
+    bool begin_wait(job& by);
+    void tell(const std::shared_ptr<job>& by, std::uint64_t ticket, boost::system::error_code code,
+              const job_event& what);
     void finish();
 
     boost::asio::any_io_executor executor_;

@@ -9,6 +9,7 @@
 #include "isolation/descriptor.hpp"
 #include "isolation/plugin_messages.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -58,6 +59,39 @@ void control_connection::log(log_level level, std::string_view text, std::uint64
 
 std::uint64_t control_connection::lines_sent_by_this_thread() noexcept { return lines_sent; }
 
+std::uint64_t process_jobs::add_request(asked what) {
+    const auto request = std::make_shared<asked>(std::move(what));
+    const std::scoped_lock lock{mutex_};
+    requests_.emplace(++last_ticket_, request);
+    return last_ticket_;
+}
+
+// -- a feed --------------------------------------------------------------------------------------------------------
+
+class process_jobs::feed final : public detail::job_feed_control {
+  public:
+    feed(process_jobs& jobs, std::uint64_t job, std::uint64_t number) noexcept
+        : jobs_(jobs), job_(job), number_(number) {}
+
+    void next(event_callback taken) override {
+        const auto ticket = jobs_.add_request({.answered = {}, .event = std::move(taken)});
+        jobs_.daemon_.say(line("next").parameter(ticket).body("{}"));
+    }
+    void close() noexcept override { jobs_.daemon_.say(line("unbind").body("{}")); }
+
+    /// A line about it.
+    [[nodiscard]] wire_line_writer line(std::string_view what) const {
+        wire_line_writer out{verb::push, control_task};
+        out.parameter(what).parameter(job_).parameter(number_);
+        return out;
+    }
+
+  private:
+    process_jobs& jobs_;
+    const std::uint64_t job_;
+    const std::uint64_t number_;
+};
+
 // -- a job ---------------------------------------------------------------------------------------------------------
 
 // The responder of a job. Unless its handler has said something before, which the daemon has to read first, a reply
@@ -103,13 +137,7 @@ class process_jobs::call final : public detail::call_control {
     void on_stop(std::function<void()> callback) override { on_stop_.set(std::move(callback)); }
     [[nodiscard]] bool stopped() const noexcept override { return on_stop_.stopped(); }
     void delegate(std::string_view command, const call_options& options, answer_callback answered) override {
-        const auto request = std::make_shared<asked>(asked{std::move(answered), options.on_progress_});
-        std::uint64_t ticket = 0;
-        {
-            const std::scoped_lock lock{jobs_.mutex_};
-            ticket = ++jobs_.last_ticket_;
-            jobs_.requests_.emplace(ticket, request);
-        }
+        const auto ticket = jobs_.add_request({.answered = std::move(answered), .progress = options.on_progress_});
         const ask_message wanted{.command = std::string{command},
                                  .at = options.at_,
                                  .urgent = options.urgent_,
@@ -119,6 +147,23 @@ class process_jobs::call final : public detail::call_control {
         jobs_.daemon_.say(
             wire_line_writer{verb::delegate, control_task}.parameter("ask").parameter(id_).parameter(ticket).body(
                 wanted));
+    }
+    std::shared_ptr<detail::job_feed_control> bind(detail::job_feed_maker /*make*/, std::string_view noun,
+                                                   const bind_options& options) override {
+        std::uint64_t number = 0;
+        {
+            const std::scoped_lock lock{jobs_.mutex_};
+            number = ++jobs_.last_feed_;
+        }
+        auto made = std::make_shared<feed>(jobs_, id_, number);
+        const bind_message wanted{.noun = std::string{noun},
+                                  .at = options.at_,
+                                  .keep = options.keep_,
+                                  .every_ms = options.every_.count(),
+                                  .hops = options.hops_,
+                                  .deadline_ms = options.deadline_.count()};
+        jobs_.daemon_.say(made->line("bind").body(wanted));
+        return made;
     }
     void log(log_level level, std::string_view text) override {
         jobs_.daemon_.log(level, text.substr(0, max_log_text), id_);
@@ -242,9 +287,23 @@ void process_jobs::resume(const wire_line& line) {
         }
         return;
     }
-    const auto code = line.adverb("code");
-    request->answered(code.empty() ? boost::system::error_code{} : errc_from_wire(code), line.body,
-                      line.adverb("message"));
+    const auto name = line.adverb("code");
+    const auto code = name.empty() ? boost::system::error_code{} : errc_from_wire(name);
+    if (!request->event) {
+        request->answered(code, line.body, line.adverb("message"));
+        return;
+    }
+    const auto kind = std::ranges::find(event_names, line.adverb("event")) - event_names.begin();
+    const auto number = [&line](std::string_view key) {
+        return static_cast<std::uint64_t>(line.number(key).value_or(0));
+    };
+    request->event(code, {.kind = code ? feed_event::lost : static_cast<feed_event>(kind),
+                          .json = line.body,
+                          .publisher = line.adverb("publisher"),
+                          .seq = number("seq"),
+                          .missed = number("missed"),
+                          .text = line.adverb("message"),
+                          .waited = std::chrono::nanoseconds{line.number("waited").value_or(0)}});
 }
 
 // -- from the control connection -----------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/job_feed.hpp>
 #include <cles/log.hpp>
 #include <cles/publisher.hpp>
 #include <cles/registrar.hpp>
@@ -59,7 +60,8 @@ class process_jobs {
     std::string serve(const wire_line& line, std::string_view node);
     /// The job whose handler runs on this thread, if it is traced; else 0.
     [[nodiscard]] static std::uint64_t traced_here() noexcept;
-    /// Runs a callback of a job: a request that it has sent is answered, or reports progress.
+    /// Runs a callback of a job: a request that it has sent is answered or reports progress, or there is an event of a
+    /// feed.
     void resume(const wire_line& line);
 
     // From the control connection:
@@ -70,10 +72,14 @@ class process_jobs {
 
   private:
     class call;
+    class feed;
     struct asked {
         answer_callback answered;
-        std::function<void(double, std::string_view)> progress;
+        std::function<void(double, std::string_view)> progress{};
+        event_callback event{}; ///< instead of `answered`
     };
+
+    std::uint64_t add_request(asked what);
 
     control_connection& daemon_;
     std::map<std::pair<verb, std::string>, async_handler, std::less<>> tasks_;
@@ -82,6 +88,7 @@ class process_jobs {
     boost::unordered_flat_map<std::uint64_t, call*> calls_;
     boost::unordered_flat_map<std::uint64_t, std::shared_ptr<asked>> requests_;
     std::uint64_t last_ticket_ = 0;
+    std::uint64_t last_feed_ = 0;
     // A cancellation may overtake its request, which comes by another connection.
     std::deque<std::uint64_t> cancelled_early_;
 };

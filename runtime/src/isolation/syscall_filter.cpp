@@ -15,6 +15,7 @@
 #include <linux/sched.h>
 #include <linux/seccomp.h>
 #include <sys/ioctl.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -155,6 +156,14 @@ void allow_only_threads(filter_code& to) {
     on_call(to, SYS_prctl, refuse_values(0, {PR_SET_PDEATHSIG})); // it ends with the daemon
 }
 
+// Shared memory is no data (RLIMIT_DATA), so no limit counts it. A process that has no others needs none.
+void refuse_shared_memory(filter_code& to) {
+    constexpr std::uint32_t shared = MAP_SHARED | MAP_ANONYMOUS;
+    on_call(to, SYS_mmap,
+            {load_argument(3), statement(BPF_ALU | BPF_AND | BPF_K, shared), jump_if(BPF_JEQ, shared, 0, 1),
+             statement(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | ENOMEM), allow_call});
+}
+
 // At Unix sockets, other programs take the daemon's user for the requester. Pairs that are connected to each other stay
 // so.
 void refuse_unix_sockets(filter_code& to) {
@@ -181,6 +190,7 @@ bool filter_syscalls(bool truncation) {
     refuse_owners(all);
     allow_only_threads(all);
     refuse_unix_sockets(all);
+    refuse_shared_memory(all);
     for (const auto number : refused_calls) {
         on_call(all, number, {refuse_call});
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/completion_queue.hpp"
 
+#include <limits>
 #include <thread>
 #include <utility>
 
@@ -25,9 +26,15 @@ void completion_queue::flush() {
     }
 }
 
-bool completion_queue::post(function what) {
+bool completion_queue::post(function what) { return post(std::move(what), max_functions); }
+
+bool completion_queue::post_always(function what) {
+    return post(std::move(what), std::numeric_limits<std::size_t>::max());
+}
+
+bool completion_queue::post(function what, std::size_t most) {
     std::unique_lock lock{mutex_};
-    if (closed_ || functions_.size() >= max_functions) {
+    if (closed_ || functions_.size() >= most) {
         return false;
     }
     functions_.push_back(std::move(what));

@@ -90,6 +90,8 @@ class completion_queue {
     void flush();
     /// Queues a function to run on the executor. False once it has been closed, or when too many are queued.
     [[nodiscard]] bool post(function what);
+    /// The same, however many are queued: for what has a limit of its own.
+    [[nodiscard]] bool post_always(function what);
     /// Swaps the contents with two empty lists.
     void take(std::vector<entry>& entries, std::vector<function>& functions);
     /// Accepts nothing more, and hands over the contents. Once it returns, no thread wakes the executor any more.
@@ -98,6 +100,7 @@ class completion_queue {
   private:
     static constexpr std::size_t max_functions = 4096;
 
+    bool post(function what, std::size_t most);
     void wake(std::unique_lock<adaptive_mutex>& lock);
 
     std::function<void()> wake_;

@@ -67,8 +67,8 @@ job_dispatcher::job_dispatcher(asio::any_io_executor executor, pool_options opti
       }),
       workers_(options_, completions_),
       pauses_(executor_, workers_, options_, [this](std::chrono::nanoseconds lasted) { report_pause(lasted); }),
-      delegated_(workers_), timer_(std::in_place, executor_), drain_limit_(std::in_place, executor_),
-      close_timeout_(options_.close_timeout) {}
+      delegated_(workers_), feeds_(completions_, workers_), timer_(std::in_place, executor_),
+      drain_limit_(std::in_place, executor_), close_timeout_(options_.close_timeout) {}
 
 asio::any_io_executor job_dispatcher::executor() const {
     const std::lock_guard lock{executor_mutex_};
@@ -83,7 +83,11 @@ void job_dispatcher::start() {
             static_cast<void>(completions_.post([this] { pauses_.check(); }));
         },
         [this] { static_cast<void>(completions_.post([] {})); }); // `process_completions` reports the change
-    pauses_.start(std::shared_ptr<pause_detector>{shared_from_this(), &pauses_});
+    pauses_.start(std::shared_ptr<pause_detector>{shared_from_this(), &pauses_}, [this] {
+        if (sharing_) {
+            sharing_->on_change(); // jobs may move again
+        }
+    });
     if (options_.check_interval.count() > 0) {
         // Once the executor runs, which may be later.
         asio::post(executor_, while_alive(weak_from_this(), [](job_dispatcher& self) { self.arm_timer(); }));
@@ -161,6 +165,7 @@ void job_dispatcher::submit(const request& what, responder answer, std::shared_p
             stop(*job);
         }
     });
+    tell_job_status(*r.requester_, [this, number = r.number] { return status_of(number); });
     const bool needs_wake = admission == worker_pool::admission::needs_wake;
     if (needs_wake && (open_ == 1 || ++unwoken_jobs_ >= max_unwoken_jobs)) { // a single job starts at once
         unwoken_jobs_ = 0;
@@ -168,6 +173,12 @@ void job_dispatcher::submit(const request& what, responder answer, std::shared_p
     } else if (needs_wake || sharing_) {
         end_burst_later();
     }
+}
+
+job_status job_dispatcher::status_of(std::uint64_t number) const {
+    const auto* const job = records_.find(number);
+    return job == nullptr ? job_status{}
+                          : job_status{.waiting = workers_.is_waiting(*job), .progress = job->reported()};
 }
 
 // More jobs may come with the same read: workers are woken for all together, and others are told of those that wait.
@@ -284,7 +295,7 @@ shareable_queue::state job_dispatcher::read_state() const {
             .idle = workers.usable - std::min(workers.running, workers.usable),
             .workers = workers.usable,
             .service_time = expected_service_time(workers),
-            .movable = workers.movable,
+            .movable = pauses_.may_start() ? workers.movable : 0, // else some may have been withdrawn
             .movable_queued = workers.movable_queued,
             .draining = draining_};
 }
@@ -358,6 +369,17 @@ void job_dispatcher::delegate(job_ptr job, std::string command, call_options opt
     if (!workers_.schedule(*job, refuse)) {
         refuse(); // no worker is left
     }
+}
+
+std::shared_ptr<detail::job_feed_control> job_dispatcher::bind(job_ptr job, std::string noun, bind_options options) {
+    const auto number = feeds_.new_number();
+    // If the pool has been closed, `next` tells.
+    static_cast<void>(
+        completions_.post_always([this, job, number, noun = std::move(noun), options = std::move(options)] {
+            const auto& by = job->requester_;
+            feeds_.open(number, by ? &*by : nullptr, noun, options);
+        }));
+    return feeds_.handle_of(number, std::move(job));
 }
 
 // -- figures -------------------------------------------------------------------------------------------------------
@@ -446,7 +468,11 @@ void job_dispatcher::on_timer() {
     if (closed_) {
         return;
     }
-    pauses_.check();
+    if (records_.size() != 0) {
+        pauses_.check();
+    } else {
+        pauses_.report(); // the next job finds out how long the executor has waited
+    }
     report_stuck();
     process_completions(); // deferred ones
     if (records_.size() != 0 || options_.check_interval.count() > 0) {
@@ -544,6 +570,7 @@ std::size_t job_dispatcher::close(std::chrono::milliseconds limit) {
         function();
     }
     delegated_.close();
+    feeds_.close();
     records_.close();
     work_guard_ = {};
     for (const auto& [record, what] : entries) {

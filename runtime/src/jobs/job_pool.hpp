@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/jobs.hpp>
 #include <cles/log.hpp>
 #include <cles/peer.hpp>
 #include <cles/registrar.hpp>
@@ -12,6 +13,7 @@
 #include "jobs/adaptive_mutex.hpp"
 #include "jobs/completion_queue.hpp"
 #include "jobs/delegated_requests.hpp"
+#include "jobs/job_feeds.hpp"
 #include "jobs/job_record.hpp"
 #include "jobs/pause_detector.hpp"
 #include "jobs/stop_notifier.hpp"
@@ -44,10 +46,12 @@ struct pool_options {
     std::chrono::milliseconds grace{2'000};
     /// How long the destructor waits for workers that run a job, before it abandons them.
     std::chrono::milliseconds close_timeout{2'000};
-    /// How often a timer runs on the service's executor, even without jobs. If the timer is late by more than
-    /// `executor_lateness`, the process was suspended or the executor was blocked: no job starts until the input that
-    /// arrived in the meantime, above all withdrawals, has been read. 0: not checked, for an executor that does not run
-    /// all the time.
+    /// After the service's executor has waited longer than this, for whatever reason, no job starts until the input
+    /// that has arrived, above all withdrawals, has been read. 0: not checked.
+    std::chrono::milliseconds max_wait{0};
+    /// How often a timer runs on the executor, even without jobs. If the timer is late by more than
+    /// `executor_lateness`, the process was suspended or the executor was blocked, which is logged. 0: not checked, for
+    /// an executor that does not run all the time.
     std::chrono::milliseconds check_interval{0};
     std::chrono::milliseconds executor_lateness{250};
     /// A handler on the I/O thread (`inline_ok`) that takes longer is logged.
@@ -132,9 +136,12 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
     /// The last reference to the record has been released.
     void return_record(job_record& r) noexcept;
     void delegate(job_ptr job, std::string command, call_options options, answer_callback answered);
+    std::shared_ptr<detail::job_feed_control> bind(job_ptr job, std::string noun, bind_options options);
     void log(job_ptr job, log_level level, std::string text);
 
   private:
+    /// Of a job, by its number.
+    [[nodiscard]] job_status status_of(std::uint64_t number) const;
     job_record& acquire_record();
     void recycle(job_record& r);
     void end_burst_later();
@@ -173,6 +180,7 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
     worker_pool workers_;
     pause_detector pauses_;
     delegated_requests delegated_;
+    job_feeds feeds_;
     stop_notifier stop_notifier_;
 
     job_record_pool records_;

@@ -4,6 +4,7 @@
 #include "jobs/current_trace.hpp"
 #include "jobs/job_pool.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <mutex>
@@ -28,6 +29,7 @@ void job_record::open(std::shared_ptr<job_dispatcher> dispatcher) {
     references_.store(1, std::memory_order_relaxed);
     answered_.store(false, std::memory_order_relaxed);
     progress_unwanted_.store(false, std::memory_order_relaxed);
+    reported_.store(0, std::memory_order_relaxed);
     result_written_ = started = false;
 }
 
@@ -61,16 +63,20 @@ job_record& job_record_pool::acquire(std::shared_ptr<job_dispatcher> dispatcher)
         free_slots_.push_back(static_cast<std::uint32_t>(slots_.size()));
         slots_.emplace_back();
     }
+    std::unique_ptr<job_record> taken;
     if (spare_.empty()) {
-        spare_.push_back(std::make_unique<job_record>());
+        taken = std::make_unique<job_record>();
+    } else {
+        taken = std::move(spare_.back());
+        spare_.pop_back();
+        spare_bytes_ -= taken->result().capacity();
     }
     const auto at = free_slots_.back();
     auto& place = slots_[at];
-    place.record = std::move(spare_.back());
+    place.record = std::move(taken);
     auto& r = *place.record;
     r.open(std::move(dispatcher));
     r.number = std::uint64_t{++place.uses} << 32U | at;
-    spare_.pop_back();
     free_slots_.pop_back();
     return r;
 }
@@ -86,7 +92,9 @@ void job_record_pool::recycle(job_record& r) {
     auto owned = std::move(slots_[at].record);
     free_slots_.push_back(at);
     r.clear(); // the dispatcher, which runs, outlives this
-    if (spare_.size() < max_spare) {
+    const auto bytes = spare_bytes_ + r.result().capacity();
+    if (spare_.size() < max_spare && bytes <= max_spare_bytes) {
+        spare_bytes_ = bytes;
         spare_.push_back(std::move(owned));
     }
 }
@@ -98,6 +106,7 @@ void job_record_pool::close() noexcept {
     slots_.clear();
     free_slots_.clear();
     spare_.clear();
+    spare_bytes_ = 0;
 }
 
 std::shared_ptr<const identity> job_record_pool::copy_of(const identity& peer) {
@@ -200,13 +209,18 @@ void job_record::send_answer() {
 // -- progress ------------------------------------------------------------------------------------------------------
 
 bool job_record::progress(double fraction, std::string_view json) {
-    if (stopped() || answered_.load(std::memory_order_relaxed) || progress_unwanted_.load(std::memory_order_relaxed)) {
+    if (stopped() || answered_.load(std::memory_order_relaxed)) {
         return false;
     }
-    std::string details{json};
     if (std::isnan(fraction)) {
         fraction = 0;
     }
+    // Listed with the job, also if the requester wants no reports.
+    reported_.store(std::clamp(fraction, reported_.load(std::memory_order_relaxed), 1.0), std::memory_order_relaxed);
+    if (progress_unwanted_.load(std::memory_order_relaxed)) {
+        return false;
+    }
+    std::string details{json};
     {
         const std::lock_guard lock{mutex_};
         if (reports_.size() >= max_reports) {
@@ -244,6 +258,11 @@ void job_record::send_progress() {
 
 void job_record::delegate(std::string_view command, const call_options& options, answer_callback answered) {
     dispatcher_->delegate(job_ptr{this}, std::string{command}, options, std::move(answered));
+}
+
+std::shared_ptr<detail::job_feed_control> job_record::bind(detail::job_feed_maker /*make*/, std::string_view noun,
+                                                           const bind_options& options) {
+    return dispatcher_->bind(job_ptr{this}, std::string{noun}, options);
 }
 
 void job_record::log(log_level level, std::string_view text) {

@@ -70,12 +70,20 @@ class job_record final : public job_queue::item, public detail::call_control {
     /// left are in jobs that do not end. (If too many requests are made at once, it is called with `busy` before this
     /// function returns.)
     void delegate(std::string_view command, const call_options& options, answer_callback answered) override;
+    /// No worker is held while the job waits for an event either: the callback is a continuation, too.
+    std::shared_ptr<detail::job_feed_control> bind(detail::job_feed_maker make, std::string_view noun,
+                                                   const bind_options& options) override;
     /// Entries that come too fast are dropped and counted.
     void log(log_level level, std::string_view text) override;
     [[nodiscard]] boost::asio::any_io_executor executor() const override;
     [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
 
     [[nodiscard]] const cles::request& request() const noexcept { return request_; }
+    /// The greatest fraction that the handler has reported; nothing: none.
+    [[nodiscard]] std::optional<double> reported() const noexcept {
+        const auto fraction = reported_.load(std::memory_order_relaxed);
+        return fraction > 0 ? std::optional{fraction} : std::nullopt;
+    }
     /// The JSON or the message with which the job is answered, as far as it is known.
     [[nodiscard]] const std::string& result() const noexcept { return result_; }
 
@@ -143,6 +151,7 @@ class job_record final : public job_queue::item, public detail::call_control {
     std::atomic<int> references_{0};
     std::atomic<bool> answered_{false}; // the thread that sets it writes the result
     std::atomic<bool> progress_unwanted_{false};
+    std::atomic<double> reported_{0}; // from 0 to 1
     stop_callback on_stop_;
     adaptive_mutex mutex_; // of the reports
     std::vector<progress_report> reports_;
@@ -195,6 +204,7 @@ class job_record_pool {
 
   private:
     static constexpr std::size_t max_spare = 1024;
+    static constexpr std::size_t max_spare_bytes = std::size_t{1} << 20U; // for results
     static constexpr std::size_t max_copies = 1024;
 
     struct slot {
@@ -203,6 +213,7 @@ class job_record_pool {
     };
 
     std::vector<std::unique_ptr<job_record>> spare_;
+    std::size_t spare_bytes_ = 0;
     std::vector<slot> slots_;
     std::vector<std::uint32_t> free_slots_;
     boost::unordered_flat_map<const identity*, std::shared_ptr<const identity>> copies_;

@@ -9,50 +9,41 @@
 #include <utility>
 
 namespace cles::runtime {
-namespace {
-
-// The input that arrived during a pause counts as read when so many rounds of the executor have brought no job and no
-// withdrawal, or after this time.
-constexpr unsigned max_quiet_rounds = 16;
-constexpr std::chrono::milliseconds max_recovery{250};
-
-} // namespace
 
 pause_detector::pause_detector(const boost::asio::any_io_executor& executor, worker_pool& workers,
                                const pool_options& options, std::function<void(std::chrono::nanoseconds)> on_pause)
-    : executor_(executor), workers_(workers), options_(options), on_pause_(std::move(on_pause)) {}
+    : executor_(executor), workers_(workers), options_(options), on_pause_(std::move(on_pause)),
+      gate_(options.max_wait) {
+    workers_.set_executor_due(gate_.open_until());
+}
 
 void pause_detector::expect_timer(std::chrono::milliseconds interval) {
     interval_ = interval;
-    update_executor_due();
+    timer_due_ = time_point::clock::now() + interval_ + options_.executor_lateness;
 }
 
-void pause_detector::update_executor_due() {
-    if (options_.check_interval.count() > 0) {
-        workers_.set_executor_due(time_point::clock::now() + interval_ + options_.executor_lateness);
+void pause_detector::report() {
+    if (!closed_ && options_.check_interval.count() > 0 && time_point::clock::now() > timer_due_) {
+        expect_timer(interval_);
+        on_pause_(interval_ + options_.executor_lateness);
     }
 }
 
 void pause_detector::detect() {
-    const auto now = time_point::clock::now();
-    if (closed_ || !workers_.executor_is_late(now)) {
+    report();
+    if (closed_) {
         return;
     }
-    update_executor_due();
-    if (std::exchange(recovering_, true)) {
-        return;
+    if (gate_.begin_round(time_point::clock::now())) {
+        workers_.pause();
+        post_round();
     }
-    workers_.pause();
-    recovery_began_ = now;
-    quiet_rounds_ = 0;
-    inputs_last_round_ = inputs_;
-    on_pause_(interval_ + options_.executor_lateness);
-    post_round();
+    workers_.set_executor_due(gate_.open_until());
 }
 
 void pause_detector::check() {
     detect();
-    if (!recovering_ && !closed_) {
+    if (!gate_.is_closed() && !closed_) {
         workers_.wake();
     }
 }
@@ -67,15 +58,13 @@ void pause_detector::post_round() {
 }
 
 void pause_detector::run_round() {
-    quiet_rounds_ = inputs_ == inputs_last_round_ ? quiet_rounds_ + 1 : 0;
-    inputs_last_round_ = inputs_;
-    if (quiet_rounds_ < max_quiet_rounds && time_point::clock::now() - recovery_began_ < max_recovery) {
+    if (gate_.end_round(time_point::clock::now())) {
+        workers_.set_executor_due(gate_.open_until());
+        workers_.unpause();
+        on_read_();
+    } else {
         post_round();
-        return;
     }
-    recovering_ = false;
-    update_executor_due();
-    workers_.unpause();
 }
 
 } // namespace cles::runtime

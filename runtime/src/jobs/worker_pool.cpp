@@ -95,6 +95,11 @@ bool worker_pool::withdraw(job_record& job) {
     return true;
 }
 
+bool worker_pool::is_waiting(const job_record& job) const {
+    const std::lock_guard lock{mutex_};
+    return job.state == job_record::run_state::queued && !job.started;
+}
+
 bool worker_pool::put_back(job_record& job) {
     const std::lock_guard lock{mutex_};
     if (closed_) {

@@ -59,6 +59,8 @@ class worker_pool {
     void wake();
     /// Removes a job that has not started. False if it has.
     bool withdraw(job_record& job);
+    /// Whether the job waits for its first worker.
+    [[nodiscard]] bool is_waiting(const job_record& job) const;
     /// Removes movable jobs: those that `choose(job, ahead, service_time)` returns true for, in the order in which they
     /// would start, until `full()` does. \param most how many are looked at, among 16 times as many jobs
     template <class Choose, class Full>

@@ -3,6 +3,7 @@
 
 #include <condition_variable>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -37,12 +38,16 @@ worker_threads::~worker_threads() { stop(std::chrono::milliseconds{0}, count());
 
 void worker_threads::add() {
     const std::lock_guard lock{state_->mutex};
-    state_->threads.emplace_back([self = state_] {
-        self->pool.attach();
-        const std::lock_guard ending{self->mutex};
-        --self->running;
-        self->one_ended.notify_all();
-    });
+    try {
+        state_->threads.emplace_back([self = state_] {
+            self->pool.attach();
+            const std::lock_guard ending{self->mutex};
+            --self->running;
+            self->one_ended.notify_all();
+        });
+    } catch (const std::system_error& e) {
+        throw std::system_error(e.code(), "the system refuses a thread");
+    }
     ++state_->running;
 }
 

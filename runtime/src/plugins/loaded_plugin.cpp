@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "plugins/loaded_plugin.hpp"
 
+#include <cles/call_options.hpp>
 #include <cles/plugin_text.hpp>
+#include <cles/schema.hpp>
 
 #include "jobs/job_record.hpp"
 #include "plugins/plugin_jobs.hpp"
@@ -11,6 +13,8 @@
 #include <chrono>
 #include <exception>
 #include <memory>
+#include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -125,6 +129,13 @@ struct loaded_plugin::host_api {
             plugin.log(how, view_of(text));
         }
     }
+    static cles_feed bind(const cles_host* host, cles_job job, cles_text noun, const cles_bind* how) noexcept {
+        return self(host).bind(job, view_of(noun), known_part(how));
+    }
+    static void next(const cles_host* host, cles_feed feed, const cles_next* wanted) noexcept {
+        self(host).next(feed, known_part(wanted));
+    }
+    static void unbind(const cles_host* host, cles_feed feed) noexcept { self(host).feeds_.remove(feed); }
 };
 
 loaded_plugin::loaded_plugin(const cles_plugin& description, std::string node, plugin_jobs& jobs,
@@ -146,7 +157,10 @@ loaded_plugin::loaded_plugin(const cles_plugin& description, std::string node, p
                                                 .on_stop = &host_api::on_stop,
                                                 .delegate = &host_api::delegate,
                                                 .job_log = &host_api::job_log,
-                                                .refuse_setting = &host_api::refuse_setting},
+                                                .refuse_setting = &host_api::refuse_setting,
+                                                .bind = &host_api::bind,
+                                                .next = &host_api::next,
+                                                .unbind = &host_api::unbind},
                                   .plugin = this} {}
 
 void loaded_plugin::log(log_level level, std::string_view text) const {
@@ -253,6 +267,13 @@ std::int32_t loaded_plugin::add_task(const cles_task& added) {
                                .inline_ok = (added.flags & CLES_TASK_INLINE_OK) != 0,
                                .local = (added.flags & CLES_TASK_LOCAL) != 0,
                                .must_be_signed = (added.flags & CLES_TASK_SIGNED) != 0}};
+    if (const auto types = view_of(added.types); !types.empty()) {
+        try {
+            task.info.types = task_types(read_task_types(types));
+        } catch (const error& e) {
+            return refuse(CLES_BAD_TASK, what + ": " + e.message());
+        }
+    }
     for (std::size_t i = 0; i < added.parameter_count; ++i) {
         task.info.parameters.emplace_back(view_of(added.parameters[i]));
     }
@@ -361,12 +382,49 @@ void loaded_plugin::delegate(plugin_jobs::id job, std::string_view command, cons
     request->sent();
 }
 
+plugin_feeds::id loaded_plugin::bind(plugin_jobs::id job, std::string_view noun, const cles_bind& how) {
+    const auto by = jobs_.find_shared(job);
+    if (!by) {
+        const bool runs_inline = !jobs_.stopped(job);
+        return feeds_.add({.feed = {},
+                           .why = runs_inline ? errc::failed : errc::cancelled,
+                           .words = runs_inline ? "a job on the I/O thread has no feeds"
+                                                : "the requester of the job no longer waits"});
+    }
+    bind_options options;
+    options.at(view_of(how.at)).keep(how.keep).every(std::chrono::milliseconds{how.every_ms});
+    options.deadline(std::chrono::milliseconds{how.deadline_ms});
+    return feeds_.add({.feed = by->bind(noun, options)});
+}
+
+void loaded_plugin::next(plugin_feeds::id feed, const cles_next& wanted) {
+    const auto waiting = std::make_shared<plugin_next>(
+        wanted, [this](std::function<void()> answer) { call_on_other_thread(std::move(answer)); });
+    const auto found = feeds_.find(feed);
+    if (found.feed.is_open()) {
+        found.feed.next([this, feed, waiting](boost::system::error_code code, const job_event& what) {
+            if (code && code != errc::busy) {
+                feeds_.remove(feed);
+            }
+            waiting->complete(code, what);
+        });
+    } else {
+        feeds_.remove(feed);
+        waiting->complete(found.why, {.text = found.words});
+    }
+    waiting->sent();
+}
+
 // Not here, because the plugin's code may take long, or wait for a lock that this thread holds.
 void loaded_plugin::call_on_other_thread(std::function<void()> callback) {
     const auto shared = std::make_shared<const std::function<void()>>(std::move(callback));
     if (!notifier_.notify({.callback = [shared] { (*shared)(); },
                            .log = [this](log_level level, const std::string& text) { log(level, text); }})) {
-        std::thread{[shared] { (*shared)(); }}.detach(); // the host has stopped
+        try { // the host has stopped
+            std::thread{[shared] { (*shared)(); }}.detach();
+        } catch (const std::system_error& e) { // so the plugin will never know, but the process is about to end
+            log(log_level::error, std::string{"no thread for a callback after the end: "} + e.code().message());
+        }
     }
 }
 

@@ -7,6 +7,7 @@
 #include <cles/registrar.hpp>
 
 #include "jobs/stop_notifier.hpp"
+#include "plugins/plugin_feeds.hpp"
 #include "plugins/plugin_jobs.hpp"
 
 #include <atomic>
@@ -79,6 +80,8 @@ class loaded_plugin {
     void call_handler(task_handler handler, void* user, const request& what, plugin_jobs::id job) const;
     void finish(plugin_jobs::id job, std::function<void(const responder&)> answer);
     void delegate(plugin_jobs::id job, std::string_view command, const cles_ask& ask);
+    plugin_feeds::id bind(plugin_jobs::id job, std::string_view noun, const cles_bind& how);
+    void next(plugin_feeds::id feed, const cles_next& wanted);
     void call_on_other_thread(std::function<void()> callback);
     void log(log_level level, std::string_view text) const;
 
@@ -87,6 +90,7 @@ class loaded_plugin {
     const std::string version_;
     const std::string node_;
     plugin_jobs& jobs_;
+    plugin_feeds feeds_;
     stop_notifier& notifier_;
     mutable std::mutex log_mutex_;
     plugin_log log_;

@@ -13,6 +13,7 @@
 #include <future>
 #include <mutex>
 #include <optional>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -98,17 +99,23 @@ plugin_stop_report plugin_host::stop(std::chrono::milliseconds limit) {
     for (auto& callback : callbacks) {
         state_->notifier.notify({.callback = std::move(callback)});
     }
-    // On a thread of its own, because a plugin may take long, or never return.
     std::promise<void> all_stopped;
     const auto end = all_stopped.get_future();
-    std::thread{[state = state_, limit, all_stopped = std::move(all_stopped)]() mutable {
+    const auto stop_all = [state = state_, limit] {
         // A callback that blocks must not prevent the plugins from stopping.
         state->callbacks_left = state->notifier.close(limit / 2);
         for (auto left = state->plugins.size(); left > 0; --left) {
             state->plugins[left - 1]->stop();
         }
-        all_stopped.set_value();
-    }}.detach();
+    };
+    try { // on a thread of its own, because a plugin may take long, or never return
+        std::thread{[stop_all, all_stopped = std::move(all_stopped)]() mutable {
+            stop_all();
+            all_stopped.set_value();
+        }}.detach();
+    } catch (const std::system_error&) { // the system refuses the thread, but the plugins have to free their devices
+        stop_all();
+    }
     end.wait_for(limit);
     plugin_stop_report report{.callbacks = state_->callbacks_left};
     for (const auto& plugin : state_->plugins) {

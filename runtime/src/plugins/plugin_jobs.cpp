@@ -31,6 +31,14 @@ void call_plugin(void (*function)(Parameters...), Arguments... arguments) noexce
     }
 }
 
+constexpr std::string_view node_has_stopped = "the node has stopped";
+
+// The error's name on the wire; empty on success.
+std::string_view name_of(boost::system::error_code code) noexcept {
+    const bool ours = code.category() == error_category() && code != errc::stopped;
+    return !code ? std::string_view{} : wire_name(ours ? static_cast<errc>(code.value()) : errc::unavailable);
+}
+
 } // namespace
 
 // -- callbacks -----------------------------------------------------------------------------------------------------
@@ -142,6 +150,12 @@ bool plugin_jobs::use(id job, std::function<void(const responder&)> use) {
     return true;
 }
 
+std::optional<responder> plugin_jobs::find_shared(id job) {
+    const std::scoped_lock lock{mutex_};
+    const auto* s = find(job);
+    return s != nullptr && s->thread_safe ? s->answer : std::nullopt;
+}
+
 bool plugin_jobs::stopped(id job) {
     const std::scoped_lock lock{mutex_};
     const auto* s = find(job);
@@ -217,29 +231,22 @@ std::uint64_t plugin_jobs::unknown_answers() const {
     return unknown_answers_;
 }
 
-// -- requests ------------------------------------------------------------------------------------------------------
+// -- what jobs wait for --------------------------------------------------------------------------------------------
 
-plugin_request::plugin_request(const cles_ask& ask, deferred_call call_later)
-    : answered_(ask.answered), progress_(ask.progress), user_(ask.user), call_later_(std::move(call_later)),
-      sending_thread_(std::this_thread::get_id()) {}
-
-plugin_request::~plugin_request() { complete(errc::unavailable, "{}", "the node has stopped"); }
+plugin_request::~plugin_request() { complete(errc::unavailable, "{}", node_has_stopped); }
 
 void plugin_request::complete(boost::system::error_code code, std::string_view json,
                               std::string_view message) noexcept {
-    if (completed_.exchange(true) || answered_ == nullptr) {
+    if (!claim() || answered_ == nullptr) {
         return;
     }
-    const auto name =
-        !code ? std::string_view{}
-              : wire_name(code.category() == error_category() ? static_cast<errc>(code.value()) : errc::unavailable);
+    const auto name = name_of(code);
     const auto result = code ? std::string_view{"{}"} : json;
     try {
-        if (sending_thread_.load() == std::this_thread::get_id()) {
-            call_later_(
-                [call = answered_, user = user_, name, result = std::string{result}, text = std::string{message}] {
-                    call_plugin(call, user, abi_text(name), abi_text(result), abi_text(text));
-                });
+        if (is_sending()) {
+            defer([call = answered_, user = user_, name, result = std::string{result}, text = std::string{message}] {
+                call_plugin(call, user, abi_text(name), abi_text(result), abi_text(text));
+            });
             return;
         }
     } catch (...) { // no memory or no thread: better now than never
@@ -248,9 +255,40 @@ void plugin_request::complete(boost::system::error_code code, std::string_view j
 }
 
 void plugin_request::report_progress(double fraction, std::string_view json) noexcept {
-    if (!completed_) {
+    if (!is_claimed()) {
         call_plugin(progress_, user_, fraction, abi_text(json));
     }
+}
+
+plugin_next::~plugin_next() { complete(errc::unavailable, {.text = node_has_stopped}); }
+
+void plugin_next::complete(boost::system::error_code code, const job_event& what) noexcept {
+    if (!claim() || event_ == nullptr) {
+        return;
+    }
+    if (!code) { // it comes on a worker
+        const cles_event event{.size = sizeof(cles_event),
+                               .kind = static_cast<std::uint32_t>(what.kind),
+                               .json = abi_text(what.json),
+                               .publisher = abi_text(what.publisher),
+                               .seq = what.seq,
+                               .missed = what.missed,
+                               .text = abi_text(what.text),
+                               .waited_ns = what.waited.count()};
+        call_plugin(event_, user_, cles_text{}, cles_text{}, &event);
+        return;
+    }
+    const auto name = name_of(code);
+    try {
+        if (is_sending()) {
+            defer([call = event_, user = user_, name, text = std::string{what.text}] {
+                call_plugin(call, user, abi_text(name), abi_text(text), nullptr);
+            });
+            return;
+        }
+    } catch (...) { // as above
+    }
+    call_plugin(event_, user_, abi_text(name), abi_text(what.text), nullptr);
 }
 
 } // namespace cles::runtime

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/error.hpp>
+#include <cles/job_feed.hpp>
 #include <cles/plugin_abi.h>
 #include <cles/responder.hpp>
 
@@ -49,6 +50,8 @@ class plugin_jobs {
     bool finish(id job, std::function<void(const responder&)> answer);
     /// Calls `use` with the responder of a job, now or soon. False if there is no such job.
     bool use(id job, std::function<void(const responder&)> use);
+    /// The responder of a job, if any thread may use it. Nothing if it may not, or there is no such job.
+    [[nodiscard]] std::optional<responder> find_shared(id job);
     /// Whether its requester does not wait for it any more.
     [[nodiscard]] bool stopped(id job);
     /// Calls back when the job is stopped; at once if it has been.
@@ -88,20 +91,44 @@ class plugin_jobs {
     bool closed_ = false;
 };
 
-/// A request that a plugin's job has sent. The plugin gets the answer exactly once, even if it never arrives, and never
-/// during the call that sends the request.
-class plugin_request {
+/// Something that a plugin's job waits for. The plugin gets it exactly once, even if it never arrives, and never during
+/// the call that begins the wait.
+class plugin_wait {
   public:
     /// Calls a function soon, on another thread.
     using deferred_call = std::function<void(std::function<void()>)>;
 
-    plugin_request(const cles_ask& ask, deferred_call call_later);
-    plugin_request(const plugin_request&) = delete;
-    plugin_request& operator=(const plugin_request&) = delete;
+    plugin_wait(const plugin_wait&) = delete;
+    plugin_wait& operator=(const plugin_wait&) = delete;
+
+    /// The call that begins the wait is about to return: from now on this thread may deliver the result.
+    void sent() noexcept { sending_thread_ = std::thread::id{}; }
+
+  protected:
+    explicit plugin_wait(deferred_call call_later)
+        : call_later_(std::move(call_later)), sending_thread_(std::this_thread::get_id()) {}
+    ~plugin_wait() = default;
+
+    /// Whether this is the first result.
+    [[nodiscard]] bool claim() noexcept { return !claimed_.exchange(true); }
+    [[nodiscard]] bool is_claimed() const noexcept { return claimed_; }
+    /// Whether this thread is in the call that begins the wait, so that it must not deliver the result.
+    [[nodiscard]] bool is_sending() const noexcept { return sending_thread_.load() == std::this_thread::get_id(); }
+    void defer(std::function<void()> deliver) const { call_later_(std::move(deliver)); }
+
+  private:
+    deferred_call call_later_;
+    std::atomic<std::thread::id> sending_thread_;
+    std::atomic<bool> claimed_{false};
+};
+
+/// A request that a plugin's job has sent.
+class plugin_request final : public plugin_wait {
+  public:
+    plugin_request(const cles_ask& ask, deferred_call call_later)
+        : plugin_wait(std::move(call_later)), answered_(ask.answered), progress_(ask.progress), user_(ask.user) {}
     ~plugin_request();
 
-    /// The call that sends the request is about to return: from now on this thread may deliver the answer.
-    void sent() noexcept { sending_thread_ = std::thread::id{}; }
     void complete(boost::system::error_code code, std::string_view json, std::string_view message) noexcept;
     void report_progress(double fraction, std::string_view json) noexcept;
 
@@ -109,9 +136,21 @@ class plugin_request {
     decltype(cles_ask::answered) answered_;
     decltype(cles_ask::progress) progress_;
     void* user_;
-    deferred_call call_later_;
-    std::atomic<std::thread::id> sending_thread_;
-    std::atomic<bool> completed_{false};
+};
+
+/// The next event of a feed, for which a plugin's job has asked.
+class plugin_next final : public plugin_wait {
+  public:
+    plugin_next(const cles_next& next, deferred_call call_later)
+        : plugin_wait(std::move(call_later)), event_(next.event), user_(next.user) {}
+    ~plugin_next();
+
+    /// \param what if `code` is set, the reason is its text
+    void complete(boost::system::error_code code, const job_event& what) noexcept;
+
+  private:
+    decltype(cles_next::event) event_;
+    void* user_;
 };
 
 } // namespace cles::runtime

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "plugins/plugin_start_guard.hpp"
 
+#include "output/terminal.hpp"
+
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <string_view>
@@ -28,9 +31,7 @@ struct {
     std::array<char, alternate_stack> stack; // for stack overflows
 } guard_state;
 
-void write_out(std::string_view text) {
-    [[maybe_unused]] const auto done = ::write(STDERR_FILENO, text.data(), text.size());
-}
+void write_out(std::string_view text) { tool::write_within(tool::stream::err, text, std::chrono::seconds{1}); }
 
 [[noreturn]] void exit_with(std::string_view what) {
     write_out({guard_state.who.data(), guard_state.size});

@@ -106,6 +106,13 @@ constexpr cles_text text_of(const char* text, size_t size) { return {text, size}
         return 4;
     }
     return 1;
+#elif defined(FAULT_BAD_TYPES)
+    cles_task task{};
+    task.size = sizeof task;
+    task.verb = CLES_BIND;
+    task.name = text_of("noun", 4);
+    task.types = text_of(R"({"updates":{"oneOf":[]}})", 24);
+    return host->add_task(host, &task) == CLES_BAD_TASK ? 1 : 0;
 #else
     (void)host;
     return 0;

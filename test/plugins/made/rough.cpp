@@ -57,6 +57,38 @@ void invented(void*, cles_job job, const cles_request*) {
     the_host->done(the_host, job, text(all ? "true" : "false"));
 }
 
+// A feed of no job, and of a job, and handles that are none.
+void binds(void*, cles_job job, const cles_request*) {
+    static std::atomic<int> ends{0};
+    static std::thread::id here;
+    here = std::this_thread::get_id();
+    cles_next next{};
+    next.size = sizeof next;
+    next.event = [](void*, cles_text code, cles_text, const cles_event* event) {
+        ends += string(code) == "cancelled" && event == nullptr && std::this_thread::get_id() != here ? 1 : 100;
+    };
+    cles_bind how{};
+    how.size = sizeof how;
+    const auto none = the_host->bind(the_host, 12345, text("self:fine"), &how);
+    the_host->next(the_host, none, &next);
+    the_host->next(the_host, 54321, &next);
+    the_host->unbind(the_host, 54321);
+    while (ends != 2) { // later, and on another thread
+        std::this_thread::yield();
+    }
+    static cles_job current;
+    static cles_feed feed;
+    current = job;
+    next.event = [](void*, cles_text code, cles_text, const cles_event* event) {
+        const bool good = code.size == 0 && event->kind == CLES_FEED_CURRENT && string(event->json) == "{\"value\":7}";
+        the_host->unbind(the_host, feed);
+        the_host->unbind(the_host, feed);
+        the_host->done(the_host, current, text(good ? "true" : "false"));
+    };
+    feed = the_host->bind(the_host, job, text("self:known"), &how);
+    the_host->next(the_host, feed, &next);
+}
+
 void throws(void*, cles_job, const cles_request*) { throw std::runtime_error{"out of the plugin"}; }
 void throws_anything(void*, cles_job, const cles_request*) { throw 7; }
 void no_json(void*, cles_job job, const cles_request*) { the_host->done(the_host, job, text("{\"a\":")); }
@@ -171,6 +203,7 @@ int32_t start(const cles_host* host, cles_text) {
     add(host, "twice", twice);
     add(host, "twice_elsewhere", twice_elsewhere);
     add(host, "invented", invented);
+    add(host, "binds", binds);
     add(host, "throws", throws);
     add(host, "throws_anything", throws_anything);
     add(host, "no_json", no_json);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // A plugin in C++ that uses everything that a plugin may use, and refuses to start if requested.
 #include <cles/coroutine_handler.hpp>
+#include <cles/job_feed.hpp>
 #include <cles/plugin.hpp>
 
 #include <boost/asio/awaitable.hpp>
@@ -52,6 +53,19 @@ class worker {
   private:
     std::thread thread_;
 };
+
+// Adds up what is published, until that is 0.
+void add_up(const cles::responder& answer, const cles::job_feed& from, int sum) {
+    from.next([answer, from, sum](boost::system::error_code code, const cles::job_event& event) {
+        if (code) {
+            answer.fail(static_cast<cles::errc>(code.value()), event.text);
+        } else if (const int value = event.as<int>(); value != 0) {
+            add_up(answer, from, sum + value);
+        } else {
+            answer.done(sum);
+        }
+    });
+}
 
 void refuse(cles::registrar& to, const std::string& how) {
     if (how == "error") {
@@ -137,6 +151,11 @@ void register_tasks(cles::registrar& to, const sound_settings& wanted) {
                             });
         });
     });
+    const auto follow = [](const cles::request& asked, const cles::responder& answer) {
+        add_up(answer, answer.bind(asked.parameter(0), cles::bind_options{}.keep(16)), 0);
+    };
+    to.on_delegate("adds_up", follow);
+    to.on_delegate("adds_up_inline", follow, {.inline_ok = true});
     to.on_bind("ticks",
                [updates = to.make_publisher()](const cles::request& asked) {
                    if (!asked.parameters().empty()) {

@@ -2,15 +2,17 @@
 # SPDX-License-Identifier: BSL-1.0
 """clesd --check, --print-config, and the sources of the configuration."""
 
+import json
 import os
 import shutil
 import signal
+import socket
 import subprocess
 import time
 import unittest
 
-from daemon import CLESD, FAULTY, PLUGINS, STUBBORN, Folder, clean_environment, clesd
-from support import PATIENCE, finish, read_line, wait_until
+from daemon import CLESD, DEFAULTS, FAULTY, PLUGINS, STUBBORN, Daemon, Folder, clean_environment, clesd
+from support import PATIENCE, finish, free_port, read_line, wait_until
 
 SLOWNESS = max(PATIENCE / 30, 1)  # of sanitizers
 
@@ -94,8 +96,8 @@ class Check(unittest.TestCase):
     def test_unusable_plugins(self):
         for name, words in (("crashes_in_entry", "its entry point ends the process by signal 11"),
                             ("exits_when_loaded", "ends the process"),
-                            ("wrong_major", "this host has 1.5"),
-                            ("newer_minor", "this host has 1.5"),
+                            ("wrong_major", "this host has 1.7"),
+                            ("newer_minor", "this host has 1.7"),
                             ("no_entry", "it is not a plugin"),
                             ("undefined_symbol", "cannot be loaded"),
                             ("crashes_in_check", "its settings check ends the process by signal 6")):
@@ -161,7 +163,9 @@ class Check(unittest.TestCase):
         self.refused(f"plugins:\n  - path: {STUBBORN}\n    config: {{a: 1}}\n", 3, "plugins[0].config.a",
                      "it has no settings")
         # The installed plugins.
-        for name, key, value, words in (("fmv", "streams", "65", "1 to 64"),
+        for name, key, value, words in (("digits", "files", "[]", "at least one"),
+                                        ("digits", "files", "[/nonexistent]", "/nonexistent: it cannot be read"),
+                                        ("fmv", "streams", "65", "1 to 64"),
                                         ("fmv", "idle_s", "0", "1 to 3600"),
                                         ("primes", "limit", "1000000000001", "at most"),
                                         ("sgd", "per_class", "0", "1 to 10000000"),
@@ -170,6 +174,7 @@ class Check(unittest.TestCase):
                                         ("strike", "weapons", "1001", "1000 at most"),
                                         ("strike", "speed", "0", "more than 0"),
                                         ("strike", "scans", "31", "30 at most"),
+                                        ("strike", "range_m", "0", "more than 0"),
                                         ("system", "interval_ms", "9", "interval_ms")):
             with self.subTest(f"{name} {key}: {value}"):
                 self.refused(f"node: a\nplugins:\n  - path: {PLUGINS}/libcles-{name}.so\n    config:\n"
@@ -202,6 +207,54 @@ class Check(unittest.TestCase):
         def values(text):
             return [line.split("  # ")[0] for line in text.splitlines() if not line.startswith("#")]
         self.assertEqual(values(said), values(unsaid))
+
+
+class Start(unittest.TestCase):
+    """A check tries what the start does first."""
+
+    def test_an_address_that_another_program_has(self):
+        with Folder() as f, socket.create_server(("127.0.0.1", 0)) as taken:
+            url = f"tcp://127.0.0.1:{taken.getsockname()[1]}"
+            file = f.write(f"node: a\nlisten: {url}\nmulticast: off\n")
+            refused = clesd("--config", file)
+            self.assertEqual(refused, (1, "", f"clesd: cannot listen on '{url}': Address already in use\n"))
+            self.assertEqual(clesd("--config", file, "--check"), refused)
+
+    def test_a_group_that_cannot_be_joined(self):
+        with Folder() as f:
+            file = f.write("node: a\nlisten: tcp://127.0.0.1:0\nmulticast: {interface: nowhere0, required: true}\n"
+                           "insecure: true\n")
+            code, out, err = clesd("--config", file, "--check")
+            self.assertEqual((code, out), (1, ""))
+            self.assertIn("on 'nowhere0': No such device", err)
+            self.assertEqual(clesd("--config", file), (code, out, err))
+            file = f.write("node: a\nlisten: tcp://127.0.0.1:0\nmulticast: {interface: nowhere0, required: false}\n"
+                           "insecure: true\n")
+            code, out, err = clesd("--config", file, "--check")
+            self.assertEqual((code, out), (0, f"{file}: can be used\n"))
+            self.assertRegex(err, r"^clesd: warning: no multicast: cannot join .* on 'nowhere0': No such device\n$")
+
+    def test_the_daemon_itself_may_run_already(self):
+        with Daemon() as d, socket.create_server(("127.0.0.1", 0)) as taken:
+            urls = [d.url, f"unix://{d.file('socket')}"]
+            file = d.write(DEFAULTS.replace("tcp://127.0.0.1:0", f"[{', '.join(urls)}]"), "running.yaml")
+            self.assertEqual(clesd("--config", file, "--check"), (0, f"{file}: can be used; the node sat1 listens already\n", ""))
+            other = d.write(DEFAULTS.replace("sat1", "sat2").replace("tcp://127.0.0.1:0", d.url), "other.yaml")
+            self.assertEqual(clesd("--config", other, "--check")[0], 1)
+            urls.append(f"tcp://127.0.0.1:{taken.getsockname()[1]}")
+            file = d.write(DEFAULTS.replace("tcp://127.0.0.1:0", f"[{', '.join(urls)}]"), "running.yaml")
+            self.assertEqual(clesd("--config", file, "--check")[0], 1)
+            self.assertEqual(json.loads(d.ask("PULL self:cles"))["node"], "sat1")
+
+    def test_other_nodes_do_not_notice(self):
+        group = f"multicast: {{interface: lo, port: {free_port()}}}"
+        base = DEFAULTS.replace("multicast: off", group)
+        with Daemon(base=base) as d:
+            for name in ("sat1", "sat2"):
+                file = d.write(base.replace("sat1", name), f"{name}-too.yaml")
+                self.assertEqual(clesd("--config", file, "--check"), (0, f"{file}: can be used\n", ""))
+            self.assertEqual(json.loads(d.ask("PULL self:cles/peers"))["peers"], [])
+            self.assertEqual(json.loads(d.ask("PULL self:cles/metrics"))["group_received"], 0)
 
 
 class Sources(unittest.TestCase):
@@ -258,25 +311,6 @@ class Sources(unittest.TestCase):
         self.assertIn("clesd --help", err)
         self.assertEqual(clesd("--help")[0], 0)
         self.assertRegex(clesd("--version")[1], r"^clesd \d+\.\d+\.\d+\n$")
-
-
-class Unit(unittest.TestCase):
-    def test_the_unit_file_matches_the_daemon(self):
-        lines = {}
-        with open(os.path.join(ROOT, "config", "clesd.service"), encoding="utf-8") as unit:
-            for line in unit:
-                if "=" in line and not line.startswith("#"):
-                    key, _, value = line.strip().partition("=")
-                    lines[key] = value
-        self.assertEqual(lines["Type"], "notify")
-        self.assertEqual(lines["ExecStart"], "clesd --config /etc/cles/clesd.yaml")
-        self.assertIn("-HUP $MAINPID", lines["ExecReload"])
-        # Restarting helps neither against an invalid configuration nor against a name conflict.
-        self.assertEqual(lines["RestartPreventExitStatus"], "2 3")
-        # Longer than the default drain.
-        drain = int(next(line for line in clesd("--print-config")[1].splitlines() if line.startswith("drain: "))
-                    .removeprefix("drain: ").removesuffix("s"))
-        self.assertGreater(int(lines["TimeoutStopSec"].removesuffix("s")), drain + 2)
 
 
 if __name__ == "__main__":

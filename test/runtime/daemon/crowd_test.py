@@ -50,6 +50,11 @@ class Crowd(unittest.TestCase):
             time.sleep(0.002)
 
     def slowest(self, seconds):
+        """The 99th percentile of requests in the quietest of three spans of time: other work of the machine disturbs some
+        of them, what the dead names cost is in each."""
+        return min(self.slowest_of_span(seconds / 3) for _ in range(3))
+
+    def slowest_of_span(self, seconds):
         """The 99th percentile of requests to one node and through it to the other, in milliseconds."""
         spans = []
         end = time.monotonic() + seconds
@@ -66,7 +71,7 @@ class Crowd(unittest.TestCase):
         return answer, time.monotonic() - begun
 
     def test_a_thousand_unreachable_nodes_do_not_slow_a_node(self):
-        before = self.slowest(3)
+        before = self.slowest(6)
         self.announce()
         wait_until(lambda: self.known() > COUNT * 9 // 10, "most of them are known")
         beside = self.slowest(6)

@@ -29,7 +29,7 @@ def clean_environment(**more):
     """An environment without variables for a daemon, and without a configuration in a default location."""
     env = {k: v for k, v in environment(XDG_CONFIG_HOME="/nowhere").items()
            if k not in ("CLES_NODE", "CLES_LISTEN", "CLES_SEEDS", "CLES_LOG", "CLES_CONFIG", "CLES_MULTICAST",
-                        "NOTIFY_SOCKET")}
+                        "NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID")}
     env.update(more)
     return env
 

@@ -206,6 +206,12 @@ class Ends(Isolated):
                   "was ended because DELEGATE 'keeps' did not end within 400 ms of its deadline or cancellation",
                   own=False, code="deadline")
 
+    def test_a_job_whose_feed_has_ended_does_not_end(self):
+        """While it waits for an update it is not overdue; afterwards it is."""
+        self.ends(f"DELEGATE self:hoards {SHORT}",
+                  "was ended because DELEGATE 'hoards' did not end within 400 ms of its deadline or cancellation",
+                  own=False, code="deadline")
+
     def test_overdue_jobs_withdraw_it(self):
         for expected in ((1, "running"), (2, "running"), (3, "withdrawn")):
             self.assertEqual(body(self.daemon.ask("DELEGATE self:keeps deadline=200"))["error"], "deadline")
@@ -589,6 +595,7 @@ class Confinement(Isolated):
                                     ("/proc/meminfo", 0, errno.EACCES),
                                     (f"/proc/{self.daemon.process.pid}/environ", errno.EACCES, errno.EACCES),
                                     ("/etc/shadow", errno.EACCES, errno.EACCES),
+                                    ("/dev/zero", errno.EACCES, errno.EACCES),
                                     ("/dev/null", 0, 0)):
             with self.subTest(path):
                 self.assertEqual(self.outcome("writes", path), writes)
@@ -621,6 +628,9 @@ class Confinement(Isolated):
             with self.subTest(task):
                 self.assertEqual(self.outcome(task, 0), errno.EPERM)
         self.assertEqual(self.outcome("clones_3", 0), errno.ENOSYS)
+        # What is shared is not counted by the limit on memory.
+        self.assertEqual(self.outcome("maps_memory", 1), errno.ENOMEM)
+        self.assertEqual(self.outcome("maps_memory", 0), 0)
         self.assertEqual(self.outcome("starts_a_thread", 0), 0)
 
     def test_attributes_of_files(self):
@@ -707,6 +717,9 @@ class Shipped(unittest.TestCase):
                     self.assertNotIn("error", body(d.ask(f"PULL self:{task}")))
             self.assertEqual(body(d.ask('DELEGATE self:primes {"below":100000}')), {"count": 9592, "largest": 99991})
             self.assertEqual(body(d.ask('DELEGATE self:primes_in_parts {"below":100000,"parts":4}'))["count"], 9592)
+            told = body(d.ask("PULL self:cles/types/primes"))["DELEGATE"]
+            self.assertEqual(told["body"]["$defs"]["range"]["required"], ["below"])
+            self.assertEqual(sorted(told["result"]["$defs"]["found"]["properties"]), ["count", "largest"])
             with d.connect() as link:
                 self.assertIn("seconds", body(link.ask("BIND self:utc")) or {"seconds": 0})
                 self.assertTrue(link.read().startswith("UPDATE sat1:utc "))
@@ -750,7 +763,9 @@ class Same(unittest.TestCase):
                      "BIND self:silent", "BIND self:nowhere", "UPDATE self:notice", "DELEGATE self:reports",
                      "PULL self:caller reply=no", "DELEGATE self:passes_on/PULL%20self%3Aquick",
                      "DELEGATE self:passes_on/PULL%20self%3Anowhere", "DELEGATE self:passes_on/PULL%20self%3Acaller",
-                     "DELEGATE self:passes_on/nonsense", "DELEGATE self:passes_on/PULL%20car9%3Aspeed"):
+                     "DELEGATE self:passes_on/nonsense", "DELEGATE self:passes_on/PULL%20car9%3Aspeed",
+                     "DELEGATE self:follows/self%3Anowhere", "DELEGATE self:follows/car9%3Aspeed",
+                     "DELEGATE self:follows/nonsense", "DELEGATE self:follows/self%3Atopic"):
             with self.subTest(line):
                 self.both(lambda link, d: link.ask(line))
 
@@ -805,6 +820,35 @@ class Same(unittest.TestCase):
 
         said = self.both(talk)
         self.assertEqual(said[2], 'UPDATE sat1:topic/7 seq=1 {"value":7}')
+
+    def test_feeds(self):
+        def talk(link, d):
+            link.ask("PUSH self:publish/5")
+            wait_until(lambda: d.ask("BIND self:topic/5") == '{"value":5}', "it is published")
+            link.send("DELEGATE self:follows/self%3Atopic%2F5 id=7 progress=yes")
+            said = [link.read()]
+            for _ in range(2):
+                link.send("PUSH self:publish/5 reply=no")
+                said.append(link.read())
+            return [*said, link.read()]
+
+        said = self.both(talk)
+        self.assertEqual([body(line) for line in said], [{"x": 5, "y": 0}] * 3 + [{"value": 3}])
+
+    def test_feeds_end_with_their_jobs(self):
+        for d in (self.here, self.there):
+            def waiting(d=d):
+                return json.loads(d.ask("PULL self:cles/metrics"))["pool"]["waiting"]
+
+            with d.connect() as link:
+                for i in range(1, 6):  # more than there are workers
+                    link.send(f"DELEGATE self:follows/self%3Asilent id={i} {PATIENT}")
+                wait_until(lambda: waiting() == 5, "all wait for an update")
+                self.assertEqual(d.ask("PULL self:quick"), '{"value":42}')
+                link.send("PUSH self:cles/cancel/3 reply=no")
+                self.assertEqual(body(link.read())["error"], "cancelled")
+            wait_until(lambda: waiting() == 0, "their requester is gone")
+        wait_until(lambda: json.loads(self.there.ask("PULL self:cles/metrics"))["isolated"][0]["jobs"] == 0, "all have ended")
 
     def test_stops(self):
         """Cancellation, a deadline and a lost link reach a job while its handler runs, and after it has returned."""

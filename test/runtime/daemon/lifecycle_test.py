@@ -4,6 +4,7 @@
 
 import json
 import os
+import resource
 import signal
 import socket
 import time
@@ -12,6 +13,7 @@ import unittest
 from daemon import DEFAULTS, STUBBORN, Daemon, body, clean_environment, clesd, wait_until_running
 from support import PATIENCE, free_port, wait_until
 
+SANITIZED = os.environ.get("SANITIZED", "") != ""
 STUBBORN_TASKS = f"plugins: [{STUBBORN}]\n"
 
 
@@ -106,6 +108,24 @@ class Start(unittest.TestCase):
             self.assertIn("Address already in use", err)
 
 
+class Threads(unittest.TestCase):
+    @unittest.skipIf(SANITIZED, "a sanitizer needs too much memory for a limit")
+    def test_one_that_the_system_refuses_is_an_error_of_the_request(self):
+        with Daemon("peers: {far: 'tcp://far.invalid:1'}\n") as d, d.connect() as link:
+            self.assertEqual(json.loads(link.ask("PULL self:cles"))["node"], "sat1")
+            with open(f"/proc/{d.process.pid}/status", encoding="ascii") as file:
+                used = next(int(line.split()[1]) for line in file if line.startswith("VmSize:"))
+            usual = resource.prlimit(d.process.pid, resource.RLIMIT_AS)
+            little = (used + 400) * 1024  # less than a thread's stack
+            resource.prlimit(d.process.pid, resource.RLIMIT_AS, (little, usual[1]))
+            for _ in range(2):
+                refused = body(link.ask("PULL far:x id=1 deadline=4000"))
+                self.assertIn("the system refuses a thread", refused["message"])
+            resource.prlimit(d.process.pid, resource.RLIMIT_AS, usual)
+            self.assertEqual(json.loads(link.ask("PULL self:cles"))["node"], "sat1")
+            self.assertEqual(d.stop()[0], 0)
+
+
 class Readiness(unittest.TestCase):
     def test_one_datagram_when_it_listens(self):
         with Manager() as m, Daemon(env=clean_environment(NOTIFY_SOCKET=m.name)) as d:
@@ -133,6 +153,55 @@ class Readiness(unittest.TestCase):
         with Daemon(env=clean_environment(NOTIFY_SOCKET="@nobody-is-there")) as d:
             d.wait_for_entry("service manager could not be notified")
             self.assertEqual(d.stop()[0], 0)
+
+
+class Watchdog(unittest.TestCase):
+    def test_a_heartbeat_at_half_the_limit(self):
+        started = time.monotonic()
+        with Manager() as m, Daemon(env=clean_environment(NOTIFY_SOCKET=m.name, WATCHDOG_USEC="400000")) as d:
+            self.assertEqual(m.hear(), "READY=1")
+            begun = time.monotonic()
+            for _ in range(5):
+                self.assertEqual(m.hear(), "WATCHDOG=1")
+            self.assertGreaterEqual(time.monotonic() - started, 1.0)
+            self.assertLess(time.monotonic() - begun, 1.0 + PATIENCE / 10)
+            d.send_signal(signal.SIGTERM)
+            self.assertEqual(m.hear(), "STOPPING=1")
+            self.assertEqual(d.end()[0], 0)
+
+    def test_a_daemon_that_drains_is_alive(self):
+        with Manager() as m, Daemon(STUBBORN_TASKS + "drain: 60s\n",
+                                    env=clean_environment(NOTIFY_SOCKET=m.name, WATCHDOG_USEC="100000")) as d, \
+                d.connect() as link:
+            link.send(f"DELEGATE sat1:waits/{d.file('go').replace('/', '%2F')} id=1 deadline=60000")
+            wait_until_running(d, 1)
+            d.send_signal(signal.SIGTERM)
+            while m.hear() != "STOPPING=1":
+                pass
+            for _ in range(3):
+                self.assertEqual(m.hear(), "WATCHDOG=1")
+            d.write("", "go")
+            self.assertEqual(d.end()[0], 0)
+
+    def test_a_suspended_daemon_sends_no_heartbeat(self):
+        with Manager() as m, Daemon(env=clean_environment(NOTIFY_SOCKET=m.name, WATCHDOG_USEC="100000")) as d:
+            self.assertEqual(m.hear(), "READY=1")
+            self.assertEqual(m.hear(), "WATCHDOG=1")
+            d.send_signal(signal.SIGSTOP)
+            time.sleep(0.2)
+            while not m.hears_nothing():
+                pass
+            time.sleep(0.2)
+            self.assertTrue(m.hears_nothing())
+            d.send_signal(signal.SIGCONT)
+            self.assertEqual(m.hear(), "WATCHDOG=1")
+
+    def test_the_limit_of_another_process_does_not_count(self):
+        with Manager() as m, Daemon(env=clean_environment(NOTIFY_SOCKET=m.name, WATCHDOG_USEC="20000",
+                                                          WATCHDOG_PID="1")):
+            self.assertEqual(m.hear(), "READY=1")
+            time.sleep(0.1)
+            self.assertTrue(m.hears_nothing())
 
 
 class Drain(unittest.TestCase):

@@ -86,6 +86,27 @@ class Pauses(unittest.TestCase):
             self.assertEqual([n - first for n in self.begun() if n >= first], [99])
         self.daemon.wait_for_entry("until the input that arrived since has been read")
 
+    def test_nor_do_they_after_short_pauses_of_an_idle_daemon(self):
+        """No longer than those that it cannot tell from a wait for work; whether they are withdrawn or their links are
+        closed."""
+        for attempt, seconds in enumerate((0.15, 0.3, 0.45, 0.6, 0.8)):
+            first = 1000 * attempt
+            with contextlib.ExitStack() as opened:
+                links = [opened.enter_context(self.daemon.connect()) for _ in range(40)]
+                for link in links:
+                    link.ask("PULL self:cles")
+                with self.paused(seconds):
+                    for number, link in enumerate(links):
+                        link.send(f"DELEGATE sat1:once/{first + number}/0 id=1 deadline=60000")
+                    for number, link in enumerate(links):
+                        if number % 2:
+                            link.send("PUSH self:cles/cancel/1 reply=no")
+                        else:
+                            link.close()
+                self.assertEqual(self.errors(links[1::2]), ["cancelled"] * 20)
+                self.serves(first + 99)
+            self.assertEqual([n - first for n in self.begun() if n >= first], [99], f"after {seconds} s")
+
     def test_other_jobs_start(self):
         with self.daemon.connect() as link:
             with self.paused():

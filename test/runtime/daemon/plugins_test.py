@@ -16,6 +16,7 @@ from support import wait_until
 # The plugin, and a part of the message.
 FAULTS = {
     "bad_tasks": "",
+    "bad_types": "this keyword is not in the subset",
     "crashes_in_entry": "by signal 11",
     "describes_nothing": "returns no description",
     "exits_when_loaded": "",

@@ -21,7 +21,7 @@ from support import CLES, PATIENCE, wait_until
 
 MEMBERS = ("hub", "gate", "gate2", "car1", "operator", "stranger")
 BRIDGES = ("hub", "gate", "gate2")
-SEALED = (0x85, 0x86, 0x87)  # POOL, ASK and ROSTER
+SEALED = (0x85, 0x86, 0x87, 0x88)  # POOL, ASK, ROSTER and SESSION
 
 
 class Recorder:

@@ -57,6 +57,11 @@ class Configuration(unittest.TestCase):
         self.refused(f"security:\n  keys: {self.fleet.keys('car1')}\n  local_users:\n    no_such_user: car2\n", 4,
                      "security.local_users.no_such_user", "there is no user 'no_such_user'")
 
+    def test_a_user_who_is_two_members(self):
+        users = f"    {pwd.getpwnam('nobody').pw_uid}: car1\n    nobody: car2\n"
+        self.refused(f"security:\n  keys: {self.fleet.keys('car1')}\n  local_users:\n{users}", 5,
+                     "security.local_users.nobody", "that user is car1 already")
+
     def test_plain_tcp(self):
         self.refused(f"security: {self.fleet.keys('car1')}\nlisten: tcp://127.0.0.1:0\n", 2, "listen[0]", "use 'tls'")
 

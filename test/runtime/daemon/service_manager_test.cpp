@@ -70,6 +70,32 @@ BOOST_AUTO_TEST_CASE(a_reload_has_a_timestamp) {
     BOOST_TEST(m.receive() == "RELOADING=1\nMONOTONIC_USEC=5000");
 }
 
+BOOST_AUTO_TEST_CASE(a_heartbeat_at_half_the_limit) {
+    using namespace std::chrono_literals;
+    const auto name = fresh_name();
+    fake_manager m{std::string{'\0'} + name};
+    const notifier watching{"@" + name, 3s};
+    BOOST_TEST((watching.heartbeat() == 1500ms));
+    BOOST_TEST(watching.alive());
+    BOOST_TEST(m.receive() == "WATCHDOG=1");
+    BOOST_TEST((notifier{"@" + name}.heartbeat() == 0s));
+    BOOST_TEST((notifier{"", 3s}.heartbeat() == 0s)); // nobody would receive it
+}
+
+BOOST_AUTO_TEST_CASE(the_limit_is_that_of_this_process) {
+    using cles::runtime::watchdog_of;
+    using namespace std::chrono_literals;
+    BOOST_TEST((watchdog_of("3000000", "17", 17) == 3s));
+    BOOST_TEST((watchdog_of("3000000", nullptr, 17) == 3s));
+    BOOST_TEST((watchdog_of("3000000", "18", 17) == 0s));
+    BOOST_TEST((watchdog_of(nullptr, "17", 17) == 0s));
+    for (const auto* malformed : {"", "0", "-1", "3s", " 3", "1e6", "18446744073709551615"}) {
+        BOOST_TEST((watchdog_of(malformed, nullptr, 17) == 0s), malformed);
+        BOOST_TEST((watchdog_of("3000000", malformed, 17) == 0s), malformed);
+    }
+    BOOST_TEST((watchdog_of("9223372036854775807", nullptr, 17) == 24h));
+}
+
 BOOST_AUTO_TEST_CASE(without_a_service_manager_nothing_fails) { BOOST_TEST(notifier{""}.ready()); }
 
 BOOST_AUTO_TEST_CASE(an_unreachable_service_manager_is_a_failure) {

@@ -3,6 +3,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <cstddef>
 #include <list>
 #include <memory>
 #include <set>
@@ -87,6 +88,35 @@ BOOST_AUTO_TEST_CASE(a_recycled_record_is_cleared) {
     BOOST_TEST(!second.started);
     BOOST_TEST(!second.stopped());
     records.recycle(second);
+}
+
+BOOST_AUTO_TEST_CASE(spare_records_keep_little_memory) {
+    constexpr std::size_t count = 64;
+    cles::runtime::job_record_pool records;
+    cles::detail::request_data data;
+    data.peer = &somebody;
+    cles::registration task;
+    task.plain = [](const cles::request&, cles::json_writer& w) { w.value(std::string(60'000, 'x')); };
+    const auto shared = std::make_shared<const cles::registration>(task);
+    std::vector<job_record*> taken;
+    for (std::size_t i = 0; i < count; ++i) {
+        taken.push_back(&records.acquire({}));
+        taken.back()->assign(cles::request{data}, records.copy_of(somebody), shared);
+        BOOST_REQUIRE(taken.back()->start(cles::time_point::max()));
+    }
+    for (auto* const r : taken) {
+        records.recycle(*r);
+    }
+    std::size_t kept = 0;
+    for (auto*& r : taken) {
+        r = &records.acquire({});
+        kept += r->result().capacity();
+    }
+    BOOST_TEST(kept > 500'000U); // some are used again
+    BOOST_TEST(kept < 1'048'576U);
+    for (auto* const r : taken) {
+        records.recycle(*r);
+    }
 }
 
 BOOST_AUTO_TEST_CASE(all_jobs_of_a_link_share_one_copy_of_its_identity) {

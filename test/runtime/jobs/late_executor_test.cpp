@@ -58,7 +58,7 @@ BOOST_AUTO_TEST_CASE(a_worker_that_requeues_its_job_continues_when_woken) {
 
 // An executor whose timer is always late.
 BOOST_AUTO_TEST_CASE(all_jobs_complete_although_the_executor_is_often_late) {
-    pooled_node node{{.workers = 16, .grace = 4ms, .check_interval = 1ms, .executor_lateness = 0ms}};
+    pooled_node node{{.workers = 16, .grace = 4ms, .max_wait = 2ms, .check_interval = 1ms, .executor_lateness = 0ms}};
     node.tasks->on_delegate("quick", [] { return 1; });
     auto client = node.peer();
     constexpr int burst = 64;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 // A plugin whose jobs append a line "number node" to a file when they run, so that a test sees which ones ran, even if
-// their node cannot answer any more. Noun: task/number/milliseconds of work.
+// their node cannot answer any more. Noun: task/number/milliseconds of work. One returns its body instead.
 #include <cles/plugin.hpp>
 
 #include <boost/describe/class.hpp>
@@ -75,6 +75,7 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
     };
     to.on_delegate("holds", hold);
     to.on_delegate("holds_here", hold, {.local = true});
+    to.on_delegate("returns", [](const cles::request& asked) { return cles::json_text{std::string{asked.body()}}; });
 }
 
 } // namespace

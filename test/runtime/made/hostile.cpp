@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // A plugin to be run in a process of its own, which some of its tasks end or try to leave. The others do what plugins
 // do, to be compared with the same plugin in the daemon.
+#include <cles/job_feed.hpp>
 #include <cles/plugin.hpp>
 
 #include <boost/describe/class.hpp>
@@ -161,6 +162,14 @@ void register_ends(cles::registrar& to) {
         static std::vector<cles::responder> kept;
         kept.push_back(answer);
     });
+    // The same, with a feed that has ended.
+    to.on_delegate("hoards", [](const cles::request&, const cles::responder& answer) {
+        const auto from = answer.bind("self:silent");
+        from.next([answer, from](boost::system::error_code, const cles::job_event&) {
+            static std::vector<cles::responder> kept;
+            kept.push_back(answer);
+        });
+    });
     to.on_delegate("exhausts_memory", [] {
         std::vector<std::unique_ptr<char[]>> all;
         for (;;) {
@@ -212,6 +221,11 @@ void register_calls(cles::registrar& to) {
     on("begins_a_session", [](int) { return ::setsid(); });
     on("changes_group", [](int group) { return ::setpgid(0, group); });
     on("makes_memory", [](int) { return ::memfd_create("x", 0); });
+    on("maps_memory", [](int shared) {
+        const auto flags = MAP_ANONYMOUS | (shared != 0 ? MAP_SHARED : MAP_PRIVATE);
+        auto* const made = ::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, flags, -1, 0);
+        return made == MAP_FAILED ? -1 : ::munmap(made, 4096);
+    });
     on("shares_memory", [](int) { return ::shmget(IPC_PRIVATE, 4096, IPC_CREAT | 0600); });
     on("outlives", [](int) { return ::prctl(PR_SET_PDEATHSIG, 0); });
     on("changes_mode", [](int) { return ::chmod("/proc/self/exe", 0700); });
@@ -330,6 +344,23 @@ void register_replies(cles::registrar& to) {
     });
 }
 
+// Reports three events, and then how many they were.
+void follow(const cles::responder& answer, const cles::job_feed& from, int count) {
+    from.next([answer, from, count](boost::system::error_code code, const cles::job_event& event) {
+        if (code) {
+            answer.fail(static_cast<cles::errc>(code.value()), event.text);
+            return;
+        }
+        answer.progress(
+            0, point{static_cast<double>(event.has_value() ? event.as<int>() : -1), static_cast<double>(event.missed)});
+        if (count == 3) {
+            answer.done(count);
+        } else {
+            follow(answer, from, count + 1);
+        }
+    });
+}
+
 void register_jobs(cles::registrar& to) {
     // Until the request is cancelled or its deadline has passed. Counts how often that happened, and how.
     struct ends {
@@ -353,6 +384,9 @@ void register_jobs(cles::registrar& to) {
             answer.fail(cles::errc::cancelled, "stopped");
         });
         ++counts->begun;
+    });
+    to.on_delegate("follows", [](const cles::request& asked, const cles::responder& answer) {
+        follow(answer, answer.bind(asked.parameter(0)), 1);
     });
     to.on_delegate("ages", [](const cles::request& asked) {
         std::this_thread::sleep_for(std::chrono::milliseconds{asked.parameter<int>(0)});

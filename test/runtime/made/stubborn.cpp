@@ -99,6 +99,8 @@ void register_tasks(cles::registrar& to) {
     to.on_delegate("never_ends", [](const cles::request&, const cles::responder&) { hang(); });
     to.on_delegate("throws", [](const cles::request&, const cles::responder&) { throw std::runtime_error{"dropped"}; });
     to.on_delegate("throws_anything", [](const cles::request&, const cles::responder&) { throw 7; });
+    to.on_delegate("throws_elsewhere",
+                   [] { std::thread{[] { throw std::runtime_error{"nobody catches it"}; }}.join(); });
     to.on_delegate("twice", [](const cles::request&, cles::responder answer) {
         answer.done(1);
         answer.done(2);

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "daemon/idle_memory.hpp"
+
+#include <ctime>
+#include <fstream>
+#include <utility>
+
+#include <unistd.h>
+
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
+
+namespace cles::runtime {
+namespace {
+
+bool has_grown(std::uint64_t now, std::uint64_t before) noexcept {
+    return now > before && now - before >= idle_memory::enough;
+}
+
+} // namespace
+
+process_usage usage_of_process() {
+    process_usage found;
+    std::ifstream pages{"/proc/self/statm"};
+    std::uint64_t all = 0;
+    std::uint64_t resident = 0;
+    if (pages >> all >> resident) {
+        found.resident = resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+    }
+#ifdef __GLIBC__
+    found.unused = ::mallinfo2().fordblks;
+#endif
+    timespec used{};
+    if (::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &used) == 0) {
+        found.cpu_time = std::chrono::seconds{used.tv_sec} + std::chrono::nanoseconds{used.tv_nsec};
+    }
+    return found;
+}
+
+void return_unused_memory() noexcept {
+#ifdef __GLIBC__
+    ::malloc_trim(0);
+#endif
+}
+
+// What has been returned still counts as unused, so more of it is needed; or it has been used again, and is resident.
+bool idle_memory::is_time(const process_usage& now) noexcept {
+    const auto used = now.cpu_time - std::exchange(known_.cpu_time, now.cpu_time);
+    return used <= idle_cpu_time && (has_grown(now.unused, known_.unused) || has_grown(now.resident, known_.resident));
+}
+
+} // namespace cles::runtime
