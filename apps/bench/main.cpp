@@ -4,6 +4,7 @@
 
 #include "arguments.hpp"
 #include "measurements.hpp"
+#include "output/end_of_output.hpp"
 #include "output/errors.hpp"
 #include "output/help_formatter.hpp"
 #include "output/terminal.hpp"
@@ -53,6 +54,7 @@ void run(const CLI::App& command, const tool::bench_arguments& given) {
 int main(int argc, char** argv) {
     // A reader that closes the pipe is reported as an error of the write.
     std::signal(SIGPIPE, SIG_IGN);
+    tool::check_output_at_exit("cles bench", tool::exit_code::local_failure);
     tool::bench_arguments given;
     CLI::App command{"", "cles bench"};
     command.formatter(std::make_shared<tool::help_formatter>());

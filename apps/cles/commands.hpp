@@ -25,18 +25,25 @@ void add_bind(CLI::App& app, context& shared);
 void add_update(CLI::App& app, context& shared);
 void add_ping(CLI::App& app, context& shared);
 void add_hz(CLI::App& app, context& shared);
+void add_sniff(CLI::App& app, context& shared);
 void add_info(CLI::App& app, context& shared);
 void add_ls(CLI::App& app, context& shared);
 void add_top(CLI::App& app, context& shared);
+void add_jobs(CLI::App& app, context& shared);
 void add_trace(CLI::App& app, context& shared);
 void add_doctor(CLI::App& app, context& shared);
 void add_completion(CLI::App& app, context& shared);
 void add_serve(CLI::App& app, context& shared);
+void add_publish(CLI::App& app, context& shared);
+void add_respond(CLI::App& app, context& shared);
 void add_keys(CLI::App& app, context& shared);
 void add_fleet(CLI::App& app, context& shared);
 void add_access(CLI::App& app, context& shared);
+void add_context(CLI::App& app);
 void add_help(CLI::App& app, context& shared);
-/// `words` are the arguments of this program, ended by a null pointer. Those after "bench" are passed to `cles-bench`.
+// `words` are the arguments of this program, ended by a null pointer. Those after the command are passed to the program
+// of its own that it starts.
+
 void add_bench(CLI::App& app, char** words);
 
 /// A description of the program and its commands.

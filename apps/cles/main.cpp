@@ -2,6 +2,7 @@
 #include <cles/version.hpp>
 
 #include "commands.hpp"
+#include "output/end_of_output.hpp"
 #include "output/errors.hpp"
 #include "output/help_formatter.hpp"
 
@@ -23,7 +24,8 @@ constexpr auto about = "Sends requests to the nodes of a CLES network, and inspe
 
 constexpr auto footer =
     "Data goes to stdout, everything else to stderr. CLES_AT is the default of --at, CLES_MULTICAST that of "
-    "--multicast, CLES_KEYS that of --keys; NO_COLOR disables colours.\n\n"
+    "--multicast, CLES_KEYS that of --keys, CLES_POOL that of --pool; 'cles context' saves such options. NO_COLOR "
+    "disables colours.\n\n"
     "Exit codes: 0 ok, 1 local failure, 2 usage, 3 no such target or task, 4 deadline,\n"
     "5 remote error, 6 busy, 130 interrupted.\n\n"
     "Examples:\n"
@@ -75,6 +77,7 @@ int run(CLI::App& app, tool::context& shared, int argc, char** argv) {
 int main(int argc, char** argv) {
     // If the reader of the output is gone, the write fails, which ends the command silently.
     std::signal(SIGPIPE, SIG_IGN);
+    tool::check_output_at_exit("cles", tool::exit_code::local_failure);
     try {
         tool::context shared;
         CLI::App app{about, "cles"};
@@ -91,18 +94,23 @@ int main(int argc, char** argv) {
         tool::add_update(app, shared);
         tool::add_ping(app, shared);
         tool::add_hz(app, shared);
+        tool::add_sniff(app, shared);
         tool::add_info(app, shared);
         tool::add_ls(app, shared);
         tool::add_top(app, shared);
+        tool::add_jobs(app, shared);
         tool::add_trace(app, shared);
         tool::add_doctor(app, shared);
         tool::add_completion(app, shared);
         tool::add_serve(app, shared);
+        tool::add_publish(app, shared);
+        tool::add_respond(app, shared);
 #ifdef CLES_SECURITY
         tool::add_keys(app, shared);
         tool::add_fleet(app, shared);
         tool::add_access(app, shared);
 #endif
+        tool::add_context(app);
         tool::add_help(app, shared);
         tool::add_bench(app, argv + 1);
         if (argc > 1 && std::string_view{argv[1]} == "__complete") {

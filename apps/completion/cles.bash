@@ -28,6 +28,10 @@ _cles() {
     type -P -- "$command" >/dev/null || command=cles # an alias
     COMPREPLY=()
     while IFS=$'\t' read -r text _; do
+        if [[ $text == [\{\[]* ]]; then # JSON, of characters that a quotation may contain
+            [[ $typed ]] || COMPREPLY+=("'$text'")
+            continue
+        fi
         COMPREPLY+=("${text#"$kept"}")
         [[ $text == *[:/=@] ]] && compopt -o nospace
     done < <("$command" __complete "${words[@]:1}" 2>/dev/null)

@@ -85,8 +85,9 @@ class Access(Trust):
         self.rules("")
         self.path("fleet/car1/rules").chmod(0o666)
         self.assertIn("chmod go-w fleet/car1/rules", self.answer("sat1", "push", "car1:target")[2])
-        for noun in ("car1:cles/roster", "car1:cles/cancel/5", "car1:cles/announced/x"):
-            self.assertEqual(self.answer("sat1", "pull", noun)[:2], ["allowed", "exempt"])
+        for noun in ("car1:cles/roster", "car1:cles/cancel/5", "car1:cles/announced/x", "car1:cles/hello", "car1:cles/leaving",
+                     "car1:cles/slots"):
+            self.assertEqual(self.answer("sat1", "push", noun)[:2], ["allowed", "exempt"])
 
     def test_at_the_authority(self):
         self.assertEqual(self.answer("sat1", "push", "car1:target", keys="fleet")[:2], ["allowed", "permitted"])

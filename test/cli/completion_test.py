@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSL-1.0
 """Completion: the candidates, and their treatment by the shells."""
 
+import json
 import os
 import shutil
 import socket
@@ -71,6 +72,8 @@ class WithoutNodes(unittest.TestCase):
         self.assertEqual(offered("pull", "--coun")["--count"], "Number of requests")
         self.assertEqual(offered("pull", "-n", ""), {})
         self.assertEqual(set(offered("completion", "")), {"bash", "zsh", "fish"})
+        self.assertEqual(set(offered("respond", "")), {"pull", "push", "delegate", "update"})
+        self.assertEqual(offered("publish", ""), {})  # its node does not run yet
 
     def test_interfaces(self):
         found = offered("ls", "-m", "")
@@ -92,7 +95,7 @@ class WithoutNodes(unittest.TestCase):
 
     @unittest.skipUnless(HAS_SECURITY, "cles was built without libsodium")
     def test_commands_in_commands(self):
-        self.assertEqual(list(offered("keys", "")), ["new", "show", "join"])
+        self.assertEqual(list(offered("keys", "")), ["new", "show", "join", "cert"])
         self.assertEqual(list(offered("fleet", "r")), ["rights", "remove", "rotate"])
         self.assertEqual(offered("-v", "fleet", "show")["show"], "Show the members of the fleet, and what they are permitted")
         self.assertEqual(offered("keys", "fly", ""), {})
@@ -156,23 +159,28 @@ class Nouns(TwoNodes):
 
     def test_nouns_of_a_node_by_verb(self):
         found = soon("pull", "car1:")
-        self.assertEqual(set(found), {"car1:localization", "car1:echo/", "car1:cles", "car1:cles/metrics",
+        self.assertEqual(set(found), {"car1:localization", "car1:echo/", "car1:systemTime/", "car1:cles", "car1:cles/metrics",
                                       "car1:cles/peers"})
         self.assertEqual(found["car1:echo/"], "Returns its parameters")
         self.assertEqual(list(soon("pull", "car1:loc")), ["car1:localization"])
         self.assertEqual(set(soon("push", "car1:")), {"car1:echo"})
-        self.assertEqual(set(soon("delegate", "car1:")), {"car1:echo", "car1:sleep/", "car1:fail"})
+        self.assertEqual(set(soon("delegate", "car1:")),
+                         {"car1:echo", "car1:sleep/", "car1:fail", "car1:systemTime/"})
         for command in ("bind", "hz"):
             self.assertEqual(set(soon(command, "car1:")), {"car1:localization", "car1:notice"})
         self.assertEqual(set(soon("update", "car1:")), {"car1:notice"})
 
     def test_nouns_of_whoever_offers_them(self):
         for target in ("any", "all"):
-            self.assertEqual(set(soon("delegate", f"{target}:s")), {f"{target}:sleep/"})
+            self.assertEqual(set(soon("delegate", f"{target}:s")), {f"{target}:sleep/", f"{target}:systemTime/"})
 
     def test_a_noun_is_the_first_argument_alone(self):
         self.assertEqual(offered("pull", "car1:localization", "c"), {})
         self.assertEqual(list(soon("pull", "-n", "3", "-o", "json", "car1:l")), ["car1:localization"])
+
+    def test_several_nouns(self):
+        self.assertEqual(list(soon("bind", "car1:notice", "car1:l")), ["car1:localization"])
+        self.assertEqual(set(soon("sniff", "car1:")), {"car1:localization", "car1:notice"})
 
     def test_where_the_line_says(self):
         url = self.nodes[1].url
@@ -191,6 +199,12 @@ class Nouns(TwoNodes):
         with socket.create_server(("127.0.0.1", 0)) as silent:
             url = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
             self.assertEqual(offered("pull", "--at", url, "self:"), {})
+
+    def test_an_example_of_a_body(self):
+        for name, wanted in (("lat", ["@", "-", '{"lat":0}']), ("it's", ["@", "-"]), ("$(id)", ["@", "-"])):
+            told = {"PUSH": {"body": {"type": "object", "properties": {name: {"type": "number"}}, "required": [name]}}}
+            with ScriptedNode(lambda line, send, told=told: send(id_of(line) + json.dumps(told))) as node:
+                self.assertEqual(list(offered("push", "--at", node.url, "car1:target", "-d", "")), wanted)
 
     def test_what_a_shell_would_run_is_not_offered(self):
         def answer(line, send):
@@ -309,7 +323,8 @@ class Shells(unittest.TestCase):
         self.assertEqual(set(completions("cles pull car")), {"car1:"})
         self.assertEqual(set(completions("cles pull car1:loc")), {"car1:localization"})
         self.assertEqual(completions("cles pull car1:e")["car1:echo/"], "Returns its parameters")
-        self.assertEqual(set(completions("cles delegate car1:")), {"car1:echo", "car1:sleep/", "car1:fail"})
+        self.assertEqual(set(completions("cles delegate car1:")),
+                         {"car1:echo", "car1:sleep/", "car1:fail", "car1:systemTime/"})
         self.assertEqual(set(completions("cles pull --output=j")), {"--output=json"})
         self.assertIn("self:localization", completions("cles pull --at " + self.node.url + " self:"))
 

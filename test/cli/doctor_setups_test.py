@@ -17,9 +17,6 @@ DEAF = GHOST.replace("127.0.0.1", "10.77.0.2")
 class Setups(DoctorTest):
     """Each test says what is wrong, and which verdict names it."""
 
-    def ip(self, host, *arguments):
-        self.hosts._ip(host, *arguments)
-
     def start_far(self, *command, wait_for="listening", **variables):
         return self.start(*command, host=self.hosts.far, wait_for=wait_for, **{"CLES_MULTICAST": "v1", **variables})
 
@@ -71,15 +68,15 @@ class Plain(Setups):
         self.told("interfaces", "failure", "for nowhere0, which does not exist", CLES_MULTICAST="nowhere0")
 
     def test_an_interface_that_is_down(self):
-        self.ip(self.hosts.near, "link", "set", "v0", "down")
+        self.hosts.ip(self.hosts.near, "link", "set", "v0", "down")
         self.told("interfaces", "failure", "for v0, which is down", CLES_MULTICAST="v0")
 
     def test_an_interface_without_an_address(self):
-        self.ip(self.hosts.near, "address", "flush", "dev", "v0")
+        self.hosts.ip(self.hosts.near, "address", "flush", "dev", "v0")
         self.told("interfaces", "failure", "for v0, which has no IPv4 address", CLES_MULTICAST="v0")
 
     def test_no_loopback(self):
-        self.ip(self.hosts.near, "link", "set", "lo", "down")
+        self.hosts.ip(self.hosts.near, "link", "set", "lo", "down")
         self.told("interfaces", "failure", "for lo, which is down")
 
     def test_the_port_of_the_group_is_taken(self):
@@ -116,7 +113,7 @@ class Plain(Setups):
 
     def test_a_node_whose_port_is_blocked(self):
         self.serve_far("car1", "--listen", "tcp://0.0.0.0:25999", "--insecure")
-        self.ip(self.hosts.near, "rule", "add", "pref", "1", "ipproto", "tcp", "dport", "25999", "unreachable")
+        self.hosts.ip(self.hosts.near, "rule", "add", "pref", "1", "ipproto", "tcp", "dport", "25999", "unreachable")
         self.told("nodes", "failure", "car1 announces itself, but does not reply at tcp://10.77.0.2:25999",
                   advice="firewall", CLES_MULTICAST="v0")
 
@@ -219,22 +216,37 @@ class Secured(Setups):
         self.serve_secured(CLES_MULTICAST="lo")
         self.told("nodes", "failure", "but datagrams that cannot be read", advice="--keys DIR")
 
+    def test_a_key_where_nodes_have_no_security(self):
+        self.start(CLES, "serve", "--name", "car1", wait_for="listening", CLES_MULTICAST="lo")
+        self.told_to(self.keys("operator"), "nodes", "failure", "but datagrams that are not sealed", advice="without --keys")
+
     def test_a_right_that_is_missing(self):
         self.cles("fleet", "rights", "operator", "--may", "pull *:localization", "-k", "fleet")
         for name in ("car1", "operator"):
             self.cles("keys", "join", "fleet/roster", "-k", f"fleet/{name}")
         self.serve_secured()
         for host in (self.hosts.near, self.hosts.far):
-            self.told_to(self.keys("operator"), "keys", "failure",
+            self.told_to(self.keys("operator"), "keys", "warning",
                          "operator may not BIND and PULL 'cles' of any other member, so it cannot find them",
                          advice="cles fleet rights operator --may", host=host)
+
+    def test_rights_that_are_minimal_on_purpose(self):
+        for rights in ("none", "pull,bind *:localization"):
+            self.cles("fleet", "rights", "operator", "--may", rights, "-k", "fleet")
+            for name in ("car1", "operator"):
+                self.cles("keys", "join", "fleet/roster", "-k", f"fleet/{name}")
+            node = self.serve_secured()
+            code, found = self.examine("--keys", self.keys("operator"), CLES_MULTICAST="")
+            self.assertEqual(code, 0, found)
+            node.kill()
+            node.wait()
 
     def test_a_right_to_ask_that_is_missing(self):
         self.cles("fleet", "rights", "operator", "--may", "bind *:cles", "-k", "fleet")
         for name in ("car1", "operator"):
             self.cles("keys", "join", "fleet/roster", "-k", f"fleet/{name}")
         self.serve_secured()
-        found = self.told_to(self.keys("operator"), "nodes", "failure", "car1 denies what nodes ask each other",
+        found = self.told_to(self.keys("operator"), "nodes", "warning", "car1 denies what nodes ask each other",
                              advice="cles fleet rights")
         self.assertNotIn("firewall", str(found["nodes"]))
 

@@ -4,10 +4,9 @@
 
 import json
 import re
-import subprocess
 import unittest
 
-from support import CLES, PATIENCE, environment, read_line, wait_until
+from support import PATIENCE, read_line, wait_until
 from two_hosts import Hosts
 
 
@@ -19,29 +18,19 @@ class Interfaces(unittest.TestCase):
         self.hosts = Hosts()
         self.addCleanup(self.hosts.close)
         near, far = self.hosts.near, self.hosts.far
-        self.ip(near, "link", "add", "w0", "type", "veth", "peer", "name", "w1", "netns", str(far))
+        self.hosts.ip(near, "link", "add", "w0", "type", "veth", "peer", "name", "w1", "netns", str(far))
         for host, number in ((near, 0), (far, 1)):
-            self.ip(host, "address", "add", f"10.78.0.{number + 1}/24", "dev", f"w{number}")
-            self.ip(host, "link", "set", f"w{number}", "up")
+            self.hosts.ip(host, "address", "add", f"10.78.0.{number + 1}/24", "dev", f"w{number}")
+            self.hosts.ip(host, "link", "set", f"w{number}", "up")
         for name in ("x0", "y0", "z0"):
-            self.ip(near, "link", "add", name, "type", "veth", "peer", "name", name.replace("0", "9"))
+            self.hosts.ip(near, "link", "add", name, "type", "veth", "peer", "name", name.replace("0", "9"))
         for name in ("x0", "x9", "z0"):
-            self.ip(near, "link", "set", name, "up")
-        self.ip(near, "address", "add", "10.79.0.1/24", "dev", "y0")
-        self.ip(near, "address", "add", "10.80.0.1/24", "dev", "z0")
-
-    def ip(self, host, *arguments):
-        subprocess.run([*self.hosts.inside(host), "ip", *arguments], check=True, capture_output=True)
+            self.hosts.ip(near, "link", "set", name, "up")
+        self.hosts.ip(near, "address", "add", "10.79.0.1/24", "dev", "y0")
+        self.hosts.ip(near, "address", "add", "10.80.0.1/24", "dev", "z0")
 
     def start(self, host, interfaces, *arguments):
-        process = subprocess.Popen([*self.hosts.inside(host), CLES, *arguments], stdin=subprocess.DEVNULL,
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                   env=environment(CLES_MULTICAST=interfaces))
-        self.addCleanup(process.stderr.close)
-        self.addCleanup(process.stdout.close)
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)
-        return process
+        return self.hosts.start(self, host, interfaces, *arguments)
 
     def run_at(self, host, interfaces, *arguments):
         process = self.start(host, interfaces, *arguments)
@@ -103,7 +92,7 @@ class Interfaces(unittest.TestCase):
 
     def test_automatic_where_there_is_none(self):
         for name in ("lo", "v1", "w1"):
-            self.ip(self.hosts.far, "link", "set", name, "down")
+            self.hosts.ip(self.hosts.far, "link", "set", name, "down")
         code, out, err = self.run_at(self.hosts.far, "auto", "serve", "--listen", "tcp://0.0.0.0:0", "--insecure")
         self.assertEqual((code, out), (1, ""))
         self.assertIn("cannot join 239.255.25.37:25370 on 'auto': no interface of this host can be used", err)
@@ -113,7 +102,7 @@ class Interfaces(unittest.TestCase):
         binder = self.start(self.hosts.far, "v1,w1", "bind", "all:localization", "-o", "json")
         seqs = [json.loads(read_line(binder))["seq"] for _ in range(20)]
         self.assertEqual(seqs, list(range(seqs[0], seqs[0] + 20)))
-        self.ip(self.hosts.near, "link", "set", "v0", "down")
+        self.hosts.ip(self.hosts.near, "link", "set", "v0", "down")
         more = [json.loads(read_line(binder))["seq"] for _ in range(20)]
         self.assertEqual(more, list(range(seqs[-1] + 1, seqs[-1] + 21)))
         asked = self.metrics_of(f"tcp://127.0.0.1:{port}")
@@ -133,7 +122,7 @@ class Interfaces(unittest.TestCase):
         wait_until(lambda: known() and known()[0][1] == "live", "car1 is heard")
         first = known()[0][2][0]
         cable = "v0" if first.startswith("tcp://10.77.") else "w0"
-        self.ip(self.hosts.near, "link", "set", cable, "down")
+        self.hosts.ip(self.hosts.near, "link", "set", cable, "down")
         other = f"tcp://10.78.0.1:{port}" if cable == "v0" else f"tcp://10.77.0.1:{port}"
         seen = set()
 

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: BSL-1.0
 """cles keys: the key of a node, and how it joins a fleet."""
 
+import base64
 import json
 import os
+import ssl
 import stat
 import subprocess
 import time
@@ -108,6 +110,29 @@ class Show(Trust):
         self.path("car1/key").chmod(0o600)
         self.path("car1/roster").write_text("{}")
         self.failed("keys", "show", "-k", "car1", says="car1/roster: ")
+
+
+class Cert(Trust):
+    def test_other_programs_can_load_it(self):
+        self.good("keys", "new", "car1", "-k", "car1")
+        done = self.good("keys", "cert", "-k", "car1")
+        self.assertEqual(done.out, "car1/tls.pem\n")
+        self.assertIn("the file contains the private key, as 'key' does, and stays in car1", done.err)
+        path = self.path("car1/tls.pem")
+        self.assertEqual(stat.S_IMODE(path.stat().st_mode), 0o600)
+        ssl.create_default_context().load_cert_chain(path)  # it refuses a certificate that is not of the key
+        pem = path.read_text()
+        der = ssl.PEM_cert_to_DER_cert(pem[pem.index("-----BEGIN CERTIFICATE"):])
+        public = json.loads(self.path("car1/car1.pub").read_text())["key"]
+        key = bytes.fromhex("302a300506032b6570032100") + base64.urlsafe_b64decode(public + "=")
+        self.assertIn(key, der)
+        self.good("keys", "cert", "-k", "car1")
+        self.assertEqual(path.read_text(), pem)
+        self.assertNotIn(pem.splitlines()[1], done.out + done.err)
+
+    def test_without_a_key(self):
+        self.path("car1").mkdir()
+        self.failed("keys", "cert", "-k", "car1", says="car1/key does not exist: 'cles keys new' creates it")
 
 
 class Join(Trust):

@@ -5,10 +5,11 @@
 import json
 import signal
 import socket
+import subprocess
 import tempfile
 import unittest
 
-from support import NodeTest, ScriptedNode, cles, environment, finish, id_of, read_line, start, wait_until
+from support import CLES, NodeTest, ScriptedNode, cles, environment, finish, id_of, read_line, start, wait_until
 
 
 class Answers(NodeTest):
@@ -74,6 +75,46 @@ class Answers(NodeTest):
         self.assertEqual(out, '{"parameters":["x"]}\n' * 3)
         out = self.run_ok("push", "car1:echo", "-d", '{"a":1}', "--count", "2", "--interval", "10ms")
         self.assertEqual(out, '{"a":1}\n' * 2)
+
+    def test_each_line_is_a_body(self):
+        out = self.run_ok("push", "car1:echo", "--lines", stdin='{"a": 1}\n\n [2, 3]\n{"last":true}')
+        self.assertEqual(out, '{"a":1}\n[2,3]\n{"last":true}\n')
+        self.assertEqual(self.run_ok("delegate", "car1:echo", "--lines", stdin=""), "")
+        s, lines = self.node.connect()
+        with s, lines:
+            s.sendall(b"BIND car1:notice\n")
+            lines.readline()
+            out = self.run_ok("update", "car1:notice", "--lines", stdin='{"n":1}\n{"n":2}\n')
+            self.assertEqual(out, "{}\n{}\n")
+            self.assertEqual([lines.readline().split(" ")[-1] for _ in range(2)], ['{"n":1}\n', '{"n":2}\n'])
+
+    def test_a_line_is_answered_before_the_next_is_read(self):
+        process = subprocess.Popen([CLES, "push", "car1:echo", "--lines", "--at", self.node.url], text=True,
+                                   stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                   env=environment())
+        for n in range(3):
+            process.stdin.write('{"n":%d}\n' % n)
+            process.stdin.flush()
+            self.assertEqual(read_line(process), '{"n":%d}\n' % n)
+        code, out, err = finish(process)
+        self.assertEqual((code, out, err), (0, "", ""))
+
+    def test_a_line_that_fails_has_an_answer_too(self):
+        code, out, err = self.run_at("push", "car1:echo", "--lines", stdin='{"a":1}\n{"a":\n7\n{"a":2}\n')
+        answers = [json.loads(line) for line in out.splitlines()]
+        self.assertEqual((code, answers[0], answers[3]), (2, {"a": 1}, {"a": 2}))
+        self.assertEqual([answer["error"] for answer in answers[1:3]], ["bad_request"] * 2)
+        self.assertTrue(err.startswith("cles: line 2 of stdin: the body is not valid JSON: "), err)
+        code, out, err = self.run_at("delegate", "car1:fail", "--lines", stdin="{}\n{}\n")
+        self.assertEqual((code, out), (5, '{"error":"failed","message":"car1: this task always fails"}\n' * 2))
+        self.assertEqual(err, "cles: failed: line 1 of stdin: car1: this task always fails\n")
+
+    def test_a_node_that_is_gone_ends_the_lines(self):
+        with socket.create_server(("127.0.0.1", 0)) as gone:
+            url = f"tcp://127.0.0.1:{gone.getsockname()[1]}"
+        code, out, err = cles("push", "car1:echo", "--lines", "--no-check", "--at", url, stdin="{}\n{}\n")
+        self.assertEqual((code, out), (1, ""), err)
+        self.assertIn("refused", err)
 
     def test_tables(self):
         body = '{"a":1,"b":{"c":"x\\u001b[31m","d":[1,"two"]},"list":[{"n":1,"s":"one"},{"n":10,"t":{"u":null}}],"e":{}}'
@@ -179,10 +220,55 @@ class Wire(unittest.TestCase):
             return cles(*arguments, "--at", node.url), node
 
     def test_sends_one_plain_line(self):
-        (code, _, err), node = self.ask("{}", "push", "car1:echo/x", "-d", ' {"a" : 1.50} ', "-t", "2s")
+        (code, _, err), node = self.ask("{}", "push", "car1:echo/x", "-d", ' {"a" : 1.50} ', "-t", "2s",
+                                          "--no-check")
         self.assertEqual((code, err), (0, ""))
         self.assertRegex(node.lines[0], r'^PUSH car1:echo/x id=\d+ deadline=(19\d\d|2000) \{"a":1\.50\}$')
         self.assertEqual(len(node.lines), 1)
+
+    TYPES = ('{"PUSH":{"body":{"$ref":"#/$defs/place","$defs":{"place":{"type":"object","properties":{"lat":'
+             '{"description":"latitude","unit":"deg","type":["number","null"],"minimum":-90,"maximum":90},'
+             '"speed":{"default":3,"type":"integer"}},"required":["lat"]}}}}}')
+
+    def typed(self, *arguments):
+        """The command at a node that tells the types of one task, and the lines that it has sent."""
+        def answer(line, send):
+            send(id_of(line) + (self.TYPES if ":cles/types/target " in line else '{"ok":true}'))
+
+        with ScriptedNode(answer) as node:
+            return cles(*arguments, "--at", node.url), node.lines
+
+    def test_a_body_that_does_not_fit_is_not_sent(self):
+        for body, why in (('{"lat":"x"}', "lat: expected a number or null, got a string"),
+                          ('{"lat":91}', "lat: outside of its range, -90 to 90"), ("{}", "lat: is missing")):
+            (code, out, err), lines = self.typed("push", "car1:target", "-d", body)
+            self.assertEqual((code, out), (2, ""))
+            self.assertTrue(err.startswith(f"cles: the body does not fit car1:target: {why} ("), err)
+            self.assertEqual([line.split(" ")[0] for line in lines], ["PULL"])
+
+    def test_a_body_that_fits_is_sent(self):
+        (code, out, err), lines = self.typed("push", "car1:target", "-d", '{"lat":1}')
+        self.assertEqual((code, out, err), (0, '{"ok":true}\n', ""))
+        self.assertRegex(lines[1], r'^PUSH car1:target id=\d+ .*\{"lat":1\}$')
+        (code, _, err), lines = self.typed("push", "car1:target", "-d", '{"lat":"x"}', "--no-check")
+        self.assertEqual((code, err, len(lines)), (0, "", 1))
+
+    def test_a_node_that_tells_no_types_is_sent_anything(self):
+        for answer in ("{}", "[]", '{"error":"no_task","message":"car1 has no PULL"}', '{"PUSH":{"body":{"pattern":"x"}}}'):
+            (_, _, _), node = self.ask(answer, "push", "car1:target", "-d", "[1]")
+            self.assertTrue(any(line.startswith("PUSH car1:target ") for line in node.lines), node.lines)
+
+    def test_the_types_of_a_task(self):
+        (code, out, err), lines = self.typed("info", "car1:target", "-o", "table")
+        self.assertEqual((code, err), (0, ""))
+        self.assertEqual(lines[0].split(" ")[1], "car1:cles/types/target")
+        shown = [line.split() for line in out.splitlines()]
+        self.assertEqual(shown[0], ["PUSH", "body", "place"])
+        self.assertEqual(shown[2], ["lat", "number", "deg", "-90", "to", "90", "latitude"])
+        self.assertEqual(shown[3][:3], ["speed", "integer", "3"])
+        self.assertEqual(shown[4], ["example", '{"lat":0,"speed":3}'])
+        (code, out, _), _ = self.typed("info", "car1:target", "-o", "json")
+        self.assertEqual((code, json.loads(out)), (0, json.loads(self.TYPES)))
 
     def test_forms_of_output(self):
         answer = '{ "a":1.50,  "b":[1, 2] }'

@@ -4,6 +4,7 @@
 
 import json
 import os
+import pwd
 import re
 import shutil
 import signal
@@ -95,9 +96,10 @@ class Secured(Trust):
         self.assertIn("denied", self.run_in("pull", "car1:echo/7", "-k", "fleet/operator").err)
 
     def test_the_key_of_a_node_asks_that_node(self):
-        self.serve("car2")
+        car2 = self.serve("car2")
         at = ("--peer", f"car1={self.car1}")
         self.assertEqual(self.good("pull", "car1:echo/7", "-k", "fleet/car1", *at).out, ECHO)
+        self.failed("pull", "car1:echo/7", "-k", "fleet/car1", "--peer", f"car1={car2}", says="another member answers there")
         self.assertEqual(self.names("-k", "fleet/car1"), ["car1", "car2"])
         states = json.loads(self.good("ls", "-k", "fleet/car1", "-o", "json").out)["peers"]
         self.assertEqual([node["state"] for node in states], ["live", "live"])
@@ -111,7 +113,7 @@ class Secured(Trust):
         self.ends_with(5, "pull", "car1:cles/metrics", "-k", "fleet/operator", "--at", self.car1, says=says)
         self.ends_with(5, "pull", "self:cles/metrics", "-k", "fleet/operator", "--at", self.car1,
                        says="car1 does not allow PULL 'cles/metrics'")
-        line = self.logged("car1", "denied PULL 'cles/metrics' of operator: ")
+        line = self.logged("car1", "operator was denied PULL car1:cles/metrics: ")
         self.assertRegex(line, r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}[+-]\d\d:\d\d info ")
 
     def test_the_log_names_the_address_and_the_key_of_a_stranger(self):
@@ -119,6 +121,15 @@ class Secured(Trust):
         key = json.loads(self.good("keys", "show", "-k", "other/stranger", "-o", "json").out)["key"]
         self.failed("pull", "self:cles", "-k", "other/stranger", "--at", self.car1, says="not in the roster")
         self.assertIn(f"(127.0.0.1, key {key})", self.logged("car1", "not in roster"))
+
+    def test_updates_that_would_not_count_are_not_waited_for(self):
+        """A node without security at a Unix socket, whose listener is trusted, but has no key."""
+        where = f"unix://{self.path('plain.sock')}"
+        process = start("serve", "--name", "car2", "-l", where, cwd=self.scratch)
+        self.addCleanup(self.end, process)
+        self.assertEqual(read_line(process), f"car2 listening on {where}\n")
+        self.ends_with(5, "bind", "car2:localization", "--duration", "10s", "-k", "fleet/operator", "--at", where,
+                       says="car2 does not confirm its epoch with its signature, so its updates do not count")
 
     @unittest.skipIf(not os.path.exists(CLES + "-bench"), "cles-bench is not built")
     def test_a_measurement(self):
@@ -158,6 +169,10 @@ class Secured(Trust):
         for text, says in (("nobody", "write USER=MEMBER"), ("=car1", "write USER=MEMBER"), ("nobody=a b", "write USER=MEMBER"),
                            ("no_such_user=car1", "there is no user 'no_such_user'")):
             self.refused("pull", "car1:echo/7", "-k", "fleet/operator", "--local-user", text, says=says)
+        nobody = pwd.getpwnam("nobody").pw_uid
+        for user in ("nobody", nobody):  # each is one member
+            self.refused("pull", "car1:echo/7", "-k", "fleet/operator", "--local-user", "nobody=car1", "--local-user",
+                         f"{user}=car2", says="that user is car1 already")
         self.refused("pull", "car1:echo/7", "--local-user", "nobody=car1", says="give --keys DIR, or set CLES_KEYS")
 
     # -- what is refused -------------------------------------------------------------------------------------------
@@ -182,6 +197,17 @@ class Secured(Trust):
         self.good("keys", "join", "fleet/roster", "-k", "fleet/car1")
         wait_until(lambda: self.run_in("pull", "self:echo/7", "-k", "fleet/operator", "--at", self.car1).code != 0,
                    "it is denied")
+
+    def test_a_command_with_an_old_roster_gets_the_newer_one(self):
+        self.serve("car2")
+        self.good("fleet", "remove", "car2", "-k", "fleet")
+        self.good("keys", "join", "fleet/roster", "-k", "fleet/car1")
+        wait_until(lambda: json.loads(self.good("pull", "self:cles", "--at", f"unix://{self.path('car1.sock')}").out)["roster"]
+                   == 3, "car1 has the newer one")
+        self.assertEqual(self.json("keys", "show", "-k", "fleet/operator")["version"], 2)
+        wait_until(lambda: self.names("-k", "fleet/operator") == ["car1"], "car1 is found, and car2 is not")
+        self.assertEqual(self.json("keys", "show", "-k", "fleet/operator")["version"], 3)
+        self.assertEqual(self.good("pull", "car1:echo/7", "-k", "fleet/operator").out, ECHO)
 
     def test_problems_of_the_directory(self):
         self.failed("pull", "car1:echo/7", "-k", "nowhere", says="nowhere")

@@ -8,6 +8,7 @@ import signal
 import socket
 import time
 import unittest
+from datetime import datetime, timezone
 
 from support import PATIENCE, Node, NodeTest, cles, finish, read_line, start
 
@@ -59,6 +60,18 @@ class Tasks(NodeTest):
         speed = way / (second["utc"] - first["utc"])
         self.assertLess(abs(speed - (first["velocity"] + second["velocity"]) / 2), 3)
 
+    def test_system_time_as_in_the_paper(self):
+        for command in ("PULL car1:systemTime", "PULL car1:systemTime/UTC", "DELEGATE car1:systemTime",
+                        "DELEGATE car1:systemTime/UTC"):
+            answer = json.loads(self.node.ask(command))
+            self.assertEqual(list(answer), ["systemTime"], command)
+            moment = datetime.strptime(answer["systemTime"].split(".")[0].rstrip("Z"), "%Y-%m-%dT%H:%M:%S")
+            self.assertLess(abs(moment.replace(tzinfo=timezone.utc).timestamp() - time.time()), PATIENCE)
+        for zone in ("TAI", "utc", "UTC/UTC"):
+            self.assertEqual(json.loads(self.node.ask(f"PULL car1:systemTime/{zone}")),
+                             {"error": "bad_request", "message":
+                              "car1: the only time zone of systemTime is UTC, as in systemTime/UTC"})
+
     def test_echo(self):
         self.assertEqual(self.node.ask("PULL car1:echo/a%20b/2"), '{"parameters":["a b","2"]}')
         self.assertEqual(self.node.ask("PULL car1:echo"), '{"parameters":[]}')
@@ -109,7 +122,8 @@ class Tasks(NodeTest):
         self.assertEqual(about["endpoints"], [self.node.url, self.node.unix])
         tasks = {(t["verb"].upper(), t["task"]) for t in about["tasks"]}
         self.assertGreaterEqual(tasks, {
-            ("PULL", "localization"), ("BIND", "localization"), ("PULL", "echo"), ("PUSH", "echo"), ("DELEGATE", "echo"),
+            ("PULL", "localization"), ("BIND", "localization"), ("PULL", "systemTime"), ("DELEGATE", "systemTime"),
+            ("PULL", "echo"), ("PUSH", "echo"), ("DELEGATE", "echo"),
             ("DELEGATE", "sleep"), ("DELEGATE", "fail"), ("BIND", "notice"), ("UPDATE", "notice")})
 
 

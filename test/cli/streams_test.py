@@ -6,7 +6,8 @@ import json
 import signal
 import unittest
 
-from support import PATIENCE, NodeTest, ScriptedNode, cles, finish, id_of, read_line, start, wait_until
+from support import (PATIENCE, NodeTest, ScriptedNode, cles, environment, finish, free_port, id_of, read_line, start,
+                     wait_until)
 
 
 class Bind(NodeTest):
@@ -129,6 +130,152 @@ class Feeds(unittest.TestCase):
         with ScriptedNode(lambda line, send: send(id_of(line) + '{"error":"busy","message":"full"}')) as node:
             code, out, err = cles("bind", "car1:x", "--at", node.url)
         self.assertEqual((code, out, err), (6, "", "cles: busy: full\n"))
+
+
+class Many(NodeTest):
+    """Several nouns, and patterns."""
+
+    ARGUMENTS = ("--rate", "50")
+
+    def read(self, *arguments):
+        return [json.loads(line) for line in self.run_ok("bind", *arguments).splitlines()]
+
+    def test_each_update_has_its_noun(self):
+        self.run_ok("update", "car1:notice", "-d", '{"text":"hi"}')
+        items = self.read("car1:localization", "car1:notice", "-n", "20")
+        self.assertEqual({(item["node"], item["noun"]) for item in items}, {("car1", "localization"), ("car1", "notice")})
+        self.assertEqual([item["update"] for item in items if item["noun"] == "notice"], [{"text": "hi"}])
+        out = self.run_ok("bind", "car1:localization", "car1:notice", "-n", "5", "-o", "table")
+        self.assertIn("NOUN", out.splitlines()[0].split())
+        self.assertIn("car1:localization", out)
+
+    def test_a_pattern_is_what_a_node_publishes(self):
+        self.run_ok("update", "car1:notice", "-d", '{"text":"hi"}')
+        for pattern in ("car1:**", "self:**", "all:**", "c*1:*"):
+            nouns = {item["noun"] for item in self.read(pattern, "-n", "20")}
+            self.assertEqual(nouns, {"localization", "notice"}, pattern)
+        for pattern in ("car1:loc*", "all:l*n"):
+            self.assertEqual({item["noun"] for item in self.read(pattern, "-n", "3")}, {"localization"}, pattern)
+
+    def test_a_pattern_that_nothing_matches(self):
+        for pattern in ("car1:nothing*", "truck*:**"):
+            code, out, err = self.run_at("bind", pattern)
+            self.assertEqual((code, out), (3, ""), err)
+            self.assertIn("nobody publishes a noun that matches", err)
+        for pattern in ("car1:**", "all:**"):
+            code, out, err = cles("bind", pattern, "--at", "tcp://127.0.0.1:1")
+            self.assertEqual((code, out), (1, ""), err)
+        process = start("sniff", "--at", "tcp://127.0.0.1:1")
+        self.assertIn("; still trying", read_line(process, process.stderr))
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(finish(process)[0], 130)
+
+    def test_one_that_cannot_be_bound_ends_all(self):
+        code, out, err = self.run_at("bind", "car1:localization", "car1:echo")
+        self.assertEqual(code, 3, out)
+        self.assertIn("no_task: ", err)
+
+    def test_hz_has_a_line_for_each(self):
+        self.run_ok("update", "car1:notice", "-d", '{"text":"hi"}')
+        out = self.run_ok("hz", "car1:**", "-n", "10")
+        self.assertRegex(out.splitlines()[-2], r"^car1:localization: [\d.]+ updates/s; ")
+        self.assertEqual(out.splitlines()[-1], "car1:notice: no update since the last line; 0 updates, missed 0")
+        last = [json.loads(line) for line in self.run_ok("hz", "car1:l*", "-n", "10", "-o", "json").splitlines()][-1]
+        self.assertEqual((last["noun"], last["updates"]), ("car1:localization", 10))
+
+    def test_sniff(self):
+        items = [json.loads(line) for line in self.run_ok("sniff", "-n", "3").splitlines()]
+        self.assertIn("car1:localization", {item["noun"] for item in items})
+        self.assertRegex(items[0]["at"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d+)?Z$")
+        lines = self.run_ok("sniff", "car1:loc*", "-n", "2", "-o", "table").splitlines()
+        self.assertRegex(lines[1], r'^\d\d:\d\d:\d\d\.\d{3}  car1:localization  #\d+  {"utc":')
+
+    def test_a_node_that_does_not_tell_its_nouns(self):
+        def answer(line, send):
+            if line.startswith("PULL car1:cles/nouns"):
+                send(id_of(line) + '{"error":"no_task","message":"no such"}')
+            elif line.startswith("PULL car1:cles "):
+                send(id_of(line) + '{"node":"car1","tasks":[{"verb":"BIND","task":"x"},{"verb":"PULL","task":"y"}]}')
+            else:
+                Feeds.updates(line, send, (1,))
+
+        with ScriptedNode(answer) as node:
+            code, out, err = cles("bind", "car1:*", "-n", "1", "--at", node.url)
+        self.assertEqual((code, out, err), (0, '{"node":"car1","noun":"x","seq":1,"update":{"n":1}}\n', ""))
+
+    def test_nouns_that_cannot_be_bound_are_left_out(self):
+        """If that leaves none, it does not wait for nothing."""
+
+        def answer(line, send):
+            if line.startswith("PULL car1:cles/nouns"):
+                send(id_of(line) + '{"nouns":["x","y"]}')
+            elif line.startswith("BIND "):
+                send(id_of(line) + '{"error":"denied","message":"no"}')
+
+        with ScriptedNode(answer) as node:
+            code, out, err = cles("bind", "car1:**", "--at", node.url)
+        self.assertEqual((code, out), (5, ""), err)
+        self.assertRegex(err, r"^cles: car1:[xy]: denied: no\ncles: denied: no\n$")
+
+    def test_a_node_that_denies_its_nouns(self):
+        def answer(line, send):
+            if line.startswith("PULL car1:cles/nouns"):
+                send(id_of(line) + '{"error":"denied","message":"no"}')
+            elif line.startswith("PULL car1:cles "):
+                send(id_of(line) + '{"node":"car1","tasks":[{"verb":"BIND","task":"x"}]}')
+            else:
+                Feeds.updates(line, send, (1,))
+
+        with ScriptedNode(answer) as node:
+            code, out, err = cles("bind", "car1:*", "-n", "1", "--at", node.url)
+        self.assertEqual((code, out, err), (0, '{"node":"car1","noun":"x","seq":1,"update":{"n":1}}\n', ""))
+
+    def test_names_that_are_none_are_left_out(self):
+        def answer(line, send):
+            if line.startswith("PULL car1:cles/nouns"):
+                send(id_of(line) + '{"nouns":["a b","x\\n","x"]}')
+            else:
+                Feeds.updates(line, send, (1,))
+
+        with ScriptedNode(answer) as node:
+            code, out, err = cles("bind", "car1:**", "-n", "1", "--at", node.url)
+        self.assertEqual((code, err), (0, ""), out)
+        self.assertEqual(json.loads(out)["noun"], "x")
+
+
+class Later(unittest.TestCase):
+    """Publishers that come later, found by their names."""
+
+    def setUp(self):
+        self.env = environment(CLES_MULTICAST=f"lo,239.255.25.37:{free_port()}")
+
+    def publish(self, noun):
+        process = start("publish", noun, "-d", '{"text":"hi"}', "--rate", "20", env=self.env)
+        self.addCleanup(lambda: (process.terminate(), finish(process)))
+        read_line(process)
+
+    def test_they_are_waited_for(self):
+        for number, arguments in enumerate((("bind", "car1:notice"), ("bind", "all:no*"), ("sniff",)), 1):
+            wait = ("--wait",) if arguments[0] == "bind" else ()
+            process = start(*arguments, *wait, "-n", "1", "-o", "json", env=self.env)
+            if number == 1:
+                self.publish("car1:notice")
+            code, out, err = finish(process)
+            self.assertEqual((code, err), (0, ""), arguments)
+            update = json.loads(out)
+            self.assertEqual(update.get("update", update), {"text": "hi"})
+
+    def test_a_user_is_told_that_it_waits(self):
+        process = start("sniff", env=self.env)
+        self.assertEqual(read_line(process, process.stderr), "cles: nothing that matches is published yet; still waiting\n")
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(finish(process)[0], 130)
+
+    def test_a_noun_that_comes_later(self):
+        process = start("bind", "car2:**", "--wait", "-n", "1", env=self.env)
+        self.publish("car2:notice/new")
+        code, out, err = finish(process)
+        self.assertEqual((code, json.loads(out)["noun"], err), (0, "notice/new", ""))
 
 
 class Hz(NodeTest):

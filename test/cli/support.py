@@ -25,9 +25,10 @@ PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "30"))
 
 def environment(**more):
     """The environment for a command, without the variables of the tester's own."""
-    env = {k: v for k, v in os.environ.items() if k not in ("CLES_AT", "CLES_KEYS", "NO_COLOR")}
+    env = {k: v for k, v in os.environ.items() if k not in ("CLES_AT", "CLES_KEYS", "CLES_POOL", "NO_COLOR")}
     env["TERM"] = "xterm"
     env["CLES_MULTICAST"] = "off"  # unless a test needs it
+    env["CLES_CONTEXT"] = ""  # not that of the tester
     env.update(more)
     return env
 
@@ -204,14 +205,14 @@ def id_of(line):
     return found.group(1) + " " if found else ""
 
 
-def on_terminal(*arguments, env=None, interrupt_after=None, keys=b"\x03", columns=None):
+def on_terminal(*arguments, env=None, interrupt_after=None, keys=b"\x03", columns=None, program=CLES):
     """Runs the command on a separate terminal; returns exit code and everything it showed. After it has shown
     `interrupt_after`, the keys are pressed."""
     pid, terminal = pty.fork()
     if pid == 0:
         if columns is not None:
             termios.tcsetwinsize(1, (24, columns))
-        os.execve(shutil.which(CLES) or CLES, [CLES, *arguments], env or environment())
+        os.execve(shutil.which(program) or program, [program, *arguments], env or environment())
     shown = b""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:

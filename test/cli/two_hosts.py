@@ -7,7 +7,7 @@ import shutil
 import subprocess
 import unittest
 
-from support import wait_until
+from support import CLES, environment, wait_until
 
 
 def cannot_be_made(why):
@@ -30,13 +30,13 @@ class Hosts:
         try:
             self.near = self._keep(["unshare", *([] if self.IS_ROOT else ["--user", "--map-root-user"]), "--net"])
             self.far = self._keep([*self.inside(self.near), "unshare", "--net"])
-            self._ip(self.near, "link", "add", near[0], "type", "veth", "peer", "name", far[0], "netns", str(self.far))
+            self.ip(self.near, "link", "add", near[0], "type", "veth", "peer", "name", far[0], "netns", str(self.far))
             for host, (name, address) in ((self.near, near), (self.far, far)):
-                self._ip(host, "address", "add", address, "dev", name)
-                self._ip(host, "link", "set", name, "up")
-                self._ip(host, "link", "set", "lo", "up")
+                self.ip(host, "address", "add", address, "dev", name)
+                self.ip(host, "link", "set", name, "up")
+                self.ip(host, "link", "set", "lo", "up")
             for host, name in ((self.near, near[0]), (self.far, far[0])):
-                wait_until(lambda at=host, of=name: "LOWER_UP" in self._ip(at, "link", "show", of), f"{name} has a link")
+                wait_until(lambda at=host, of=name: "LOWER_UP" in self.ip(at, "link", "show", of), f"{name} has a link")
         except (subprocess.CalledProcessError, OSError) as failure:
             self.close()
             words = getattr(failure, "stderr", None) or ""
@@ -57,8 +57,18 @@ class Hosts:
         user = [] if cls.IS_ROOT else ["--preserve-credentials", "--user"]
         return ["nsenter", *user, "--net", f"--target={host}"]
 
-    def _ip(self, host, *arguments):
+    def ip(self, host, *arguments):
         return subprocess.run([*self.inside(host), "ip", *arguments], check=True, capture_output=True, text=True).stdout
+
+    def start(self, test, host, multicast, *arguments):
+        """Starts `cles` there, until the test ends."""
+        process = subprocess.Popen([*self.inside(host), CLES, *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, text=True, env=environment(CLES_MULTICAST=multicast))
+        test.addCleanup(process.stderr.close)
+        test.addCleanup(process.stdout.close)
+        test.addCleanup(process.wait)
+        test.addCleanup(process.kill)
+        return process
 
     def close(self):
         for keeper in reversed(self.keepers):

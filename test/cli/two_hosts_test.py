@@ -4,10 +4,9 @@
 
 import json
 import re
-import subprocess
 import unittest
 
-from support import CLES, PATIENCE, environment, read_line, wait_until
+from support import PATIENCE, read_line, wait_until
 from two_hosts import Hosts
 
 
@@ -18,14 +17,7 @@ class TwoHosts(unittest.TestCase):
         cls.addClassCleanup(cls.hosts.close)
 
     def start(self, host, *arguments):
-        process = subprocess.Popen([*self.hosts.inside(host), CLES, *arguments], stdin=subprocess.DEVNULL,
-                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                   env=environment(CLES_MULTICAST="v0" if host == self.hosts.near else "v1"))
-        self.addCleanup(process.stderr.close)
-        self.addCleanup(process.stdout.close)
-        self.addCleanup(process.wait)
-        self.addCleanup(process.kill)
-        return process
+        return self.hosts.start(self, host, "v0" if host == self.hosts.near else "v1", *arguments)
 
     def serve(self, host, name, *listen, more=()):
         process = self.start(host, "serve", "--name", name, "--insecure", *more, *[f"--listen={url}" for url in listen])

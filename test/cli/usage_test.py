@@ -8,7 +8,7 @@ import unittest
 from support import HAS_SECURITY, cles, environment, finish, on_terminal, read_line, start
 
 COMMANDS = ("pull", "push", "delegate", "bind", "update", "ping", "hz", "info", "ls", "top", "doctor", "completion",
-            "serve")
+            "serve", "publish", "respond", "jobs", "sniff", "context", "gateway")
 if HAS_SECURITY:
     COMMANDS += ("keys", "fleet", "access")
 
@@ -70,6 +70,10 @@ class Usage(unittest.TestCase):
     def test_numbers(self):
         for text in ("x", "", "-1s", "1h30", "5 s", "1d", "inf", "nan", "1e3", "0x10"):
             self.refused("pull", "car1:a", f"--timeout={text}", says="" if text == "" else "not a duration")
+        self.refused("pull", "car1:a", "-t", "soon", says="write 500ms, 2s, 1min, 1h")
+        for text in ("500us", "1.5ms", "0.0001", "1500us"):
+            for command in (("pull", "car1:a", "-t"), ("bind", "car1:a", "--every"), ("ls", "-w"), ("top", "-i")):
+                self.refused(*command, text, says="not a whole number of milliseconds")
         self.refused("pull", "car1:a", "-t", "0", says="too short")
         self.refused("pull", "car1:a", "-t", "90000", says="longer than a day")
         self.refused("pull", "car1:a", "-i", "soon", says="not a duration")
@@ -84,15 +88,17 @@ class Usage(unittest.TestCase):
                 self.refused(command, option, "2s", says="longer than a second")
 
     def test_units(self):
-        for text in ("1h", "1.5h", "2min", "3s", "20ms", "20000us", "2"):
+        for text in ("1h", "1.5h", "2min", "3s", "1.001s", "20ms", "20000us", "2"):
             code, _, err = cles("pull", "self:a", "--at", "tcp://127.0.0.1:1", "-t", text, "-i", text)
             self.assertEqual(code, 1, err)  # nobody is there
         for text in ("50us", "1ms", "50"):
             self.refused("serve", "--busy-poll", text, "--listen", "inproc://x", says="inproc")
 
     def test_what_a_binding_is_for(self):
-        for command in ("bind", "hz"):
+        for command in ("bind", "hz", "sniff"):
             self.refused(command, "any:a", says="needs the name of one, or all")
+            self.refused(command, "car1:a", "any:*", says="needs the name of one, or all")
+            self.refused(command, "car1:**/a", says="the last part")
             self.assertIn("NODE may be self or all", cles("help", command)[1])
             self.assertEqual(cles("__complete", command, "an")[1], "")
         self.assertIn("NODE may be self, any or all", cles("help", "pull")[1])

@@ -35,9 +35,7 @@ cles::service_options options_of(const address_book& addresses, int verbosity, b
     addresses.check();
     cles::service_options options;
     options.name = "cles-" + std::to_string(::getpid());
-    if (const char* pool = std::getenv("CLES_POOL"); pool != nullptr) {
-        options.pool = pool;
-    }
+    options.pool = addresses.pool();
     if (addresses.is_secured()) {
         use_member_key(options, addresses.keys(), addresses.local_users());
     }
@@ -50,27 +48,16 @@ cles::service_options options_of(const address_book& addresses, int verbosity, b
     return options;
 }
 
-bool has_code(const std::exception_ptr& thrown, cles::errc code) {
+boost::system::error_code code_of(const std::exception_ptr& thrown) {
     if (!thrown) {
-        return false;
+        return {};
     }
     try {
         std::rethrow_exception(thrown);
     } catch (const cles::error& e) {
-        return e.code() == code;
+        return e.code();
     } catch (...) {
-        return false;
-    }
-}
-
-// Whether the library has refused to ask at the Unix socket of another user.
-bool is_of_another_user(const std::exception_ptr& thrown) {
-    try {
-        std::rethrow_exception(thrown);
-    } catch (const cles::error& e) {
-        return std::string_view{e.code().category().name()} == "cles.unix";
-    } catch (...) {
-        return false;
+        return cles::errc::failed;
     }
 }
 
@@ -100,13 +87,11 @@ client::client(const address_book& addresses, int verbosity, bool in_group)
 cles::call_options client::options_for(std::string_view noun, std::optional<std::chrono::milliseconds> limit) const {
     cles::call_options options;
     const auto target = noun.substr(0, noun.find(':'));
-    auto url = addresses_.url_for(target);
-    if (url.empty() && target == node_.name()) { // the node whose key this is, not this command
-        url = addresses_.endpoint_of(target);
-        url = url.empty() ? std::string{addresses_.default_node()} : url;
-    }
-    if (!url.empty()) {
+    if (const auto url = addresses_.url_for(target); !url.empty()) {
         options.at(url);
+    } else if (target == node_.name()) { // the node whose key this is, not this command
+        const auto known = endpoint_of(target);
+        options.at(known.empty() ? addresses_.default_node() : known, target);
     }
     if (limit) {
         options.deadline(*limit);
@@ -136,7 +121,7 @@ int client::run(asio::awaitable<void> work) {
                    asio::bind_cancellation_slot(cancel_.slot(), [this, &thrown](std::exception_ptr failure) {
                        finished_ = true;
                        thrown = std::move(failure);
-                       if (has_code(thrown, cles::errc::no_target)) {
+                       if (code_of(thrown) == cles::errc::no_target) {
                            suggest_node();
                            suggest_address();
                        }
@@ -157,7 +142,7 @@ int client::run(asio::awaitable<void> work) {
     if (!hint_.empty()) {
         note(hint_);
     }
-    if (is_of_another_user(thrown)) {
+    if (code_of(thrown).category() == cles::untrusted_listener_category()) {
         note("if that user runs the node, say which member it is: --local-user USER=MEMBER");
     }
     if (may_have_asked_secured_node(thrown)) {
@@ -168,8 +153,9 @@ int client::run(asio::awaitable<void> work) {
 
 // A secured node closes a plain link, and drops plain datagrams.
 bool client::may_have_asked_secured_node(const std::exception_ptr& thrown) const {
-    const bool lost = has_code(thrown, cles::errc::unavailable);
-    if (addresses_.is_secured() || noun_.empty() || (!lost && !has_code(thrown, cles::errc::deadline))) {
+    const auto code = code_of(thrown);
+    const bool lost = code == cles::errc::unavailable;
+    if (addresses_.is_secured() || noun_.empty() || (!lost && code != cles::errc::deadline)) {
         return false;
     }
     return addresses_.endpoint_of(target_of(noun_)).starts_with(lost ? "tcp:" : "udp:");
@@ -185,7 +171,7 @@ asio::awaitable<void> client::run_explained(asio::awaitable<void> work) {
     if (!thrown) {
         co_return;
     }
-    if (!end_code_ && has_code(thrown, cles::errc::no_task)) {
+    if (!end_code_ && code_of(thrown) == cles::errc::no_task) {
         co_await suggest_task();
     }
     std::rethrow_exception(thrown);

@@ -34,6 +34,9 @@ class client {
     [[nodiscard]] cles::call_options options_for(std::string_view noun,
                                                  std::optional<std::chrono::milliseconds> limit) const;
 
+    /// The pool of this command; empty: the unnamed pool.
+    [[nodiscard]] std::string pool() const { return addresses_.pool(); }
+
     /// The URL of that node, which is known at the latest when it has answered.
     [[nodiscard]] std::string endpoint_of(std::string_view node) const;
 
@@ -43,6 +46,7 @@ class client {
 
     /// Cancels the coroutine; `run` returns this exit code.
     void end(int code);
+    [[nodiscard]] bool is_ending() const noexcept { return end_code_.has_value(); }
     /// Ends with success after that time.
     void end_after(std::chrono::milliseconds limit);
 

@@ -17,17 +17,19 @@
 namespace tool {
 
 void use_member_key(cles::service_options& options, const std::string& directory,
-                    const std::map<std::string, std::string>& local_users) {
+                    const std::vector<std::pair<std::string, std::string>>& local_users) {
     cles::security::forbid_core_dumps();
     cles::security_options from{.directory = directory};
     for (const auto& [user, member] : local_users) {
         const auto id = cles::security::id_of_user(user);
+        std::string said = "--local-user '";
+        said.append(user).append("=").append(member).append("': ");
         if (!id) {
-            std::string why = "--local-user '";
-            why.append(user).append("=").append(member).append("': there is no user '").append(user).append("'");
-            throw usage_error(why);
+            throw usage_error(said.append("there is no user '").append(user).append("'"));
         }
-        from.local_users.emplace(*id, member);
+        if (const auto [at, is_new] = from.local_users.emplace(*id, member); !is_new && at->second != member) {
+            throw usage_error(said.append("that user is ").append(at->second).append(" already"));
+        }
     }
     try {
         options.security = cles::secured(std::move(from));
@@ -56,7 +58,7 @@ namespace {
 } // namespace
 
 void use_member_key(cles::service_options& /*options*/, const std::string& directory,
-                    const std::map<std::string, std::string>& /*local_users*/) {
+                    const std::vector<std::pair<std::string, std::string>>& /*local_users*/) {
     refuse(directory);
 }
 

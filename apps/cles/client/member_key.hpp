@@ -3,17 +3,18 @@
 
 #include <cles/service.hpp>
 
-#include <map>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace tool {
 
 /// Makes the service the member of a fleet whose key is in this directory: sets its security and its name.
-/// \param local_users which members other users of this host are, by the name or id of the user
+/// \param local_users other users of this host, by name or id, and which member each is
 /// \throws std::runtime_error that says what is wrong in the directory, and what corrects it
-/// \throws usage_error if there is no such user
+/// \throws usage_error if there is no such user, or if one is stated to be two members
 void use_member_key(cles::service_options& options, const std::string& directory,
-                    const std::map<std::string, std::string>& local_users = {});
+                    const std::vector<std::pair<std::string, std::string>>& local_users = {});
 
 /// Options of a service with the key in that directory, and its name; without a directory, with this name.
 /// \throws std::runtime_error as above

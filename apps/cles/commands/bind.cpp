@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/json_writer.hpp>
+
 #include "client/client.hpp"
 #include "commands.hpp"
 #include "commands/feed_arguments.hpp"
-#include "options/addresses.hpp"
+#include "options/arguments.hpp"
 #include "options/common_options.hpp"
 #include "output/printer.hpp"
 #include "output/terminal.hpp"
@@ -13,6 +15,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -26,13 +29,26 @@ struct bind_arguments {
     output_format format = output_format::automatic;
 };
 
+using bound_item = feed_set::item;
+
+// The node that publishes it, and what it publishes: "car1", "localization".
+std::pair<std::string, std::string> source_of(const std::string& noun, const bound_item& item) {
+    const std::string target{target_of(noun)};
+    return {item.publisher.empty() ? target : item.publisher, noun.substr(target.size() + 1)};
+}
+
 // The last value, in the reply to BIND, has no number.
-std::string with_publisher(const cles::feed_item<cles::json_text>& item) {
+std::string with_source(const std::string& noun, const bound_item& item, bool is_of_many) {
+    const auto [node, path] = source_of(noun, item);
     std::string text;
     cles::json_writer w{text};
     w.begin_object();
     w.plain_key("node");
-    w.value(std::string_view{item.publisher});
+    w.value(std::string_view{node});
+    if (is_of_many) {
+        w.plain_key("noun");
+        w.value(std::string_view{path});
+    }
     w.plain_key("seq");
     if (item.kind == cles::feed_event::update) {
         w.value(item.seq);
@@ -45,33 +61,27 @@ std::string with_publisher(const cles::feed_item<cles::json_text>& item) {
     return text;
 }
 
-// For `all:` each update is shown with its publisher.
-void show(printer& out, const bind_arguments& args, const cles::feed_item<cles::json_text>& item) {
+// Of several nouns, each update is shown with its noun, and for `all:` with its publisher.
+void show(printer& out, const bind_arguments& args, const std::string& noun, const bound_item& item) {
     const auto seq = item.kind == cles::feed_event::update ? std::to_string(item.seq) : "-";
     std::vector<json_cell> leading{{"seq", seq, true}};
-    if (!args.feed.noun.starts_with("all:")) {
+    const bool is_of_many = args.feed.is_of_many();
+    if (!is_of_many && !noun.starts_with("all:")) {
         out.print(item.value.text, std::move(leading));
     } else if (resolved(args.format) == output_format::table) {
-        leading.insert(leading.begin(), {"NODE", printable(item.publisher), false});
+        const auto [node, path] = source_of(noun, item);
+        leading.insert(leading.begin(), is_of_many ? json_cell{"NOUN", printable(node + ":" + path), false}
+                                                   : json_cell{"NODE", printable(node), false});
         out.print(item.value.text, std::move(leading));
     } else {
-        out.print(with_publisher(item));
+        out.print(with_source(noun, item, is_of_many));
     }
 }
 
-asio::awaitable<void> follow(client& requester, const bind_arguments& args) {
+asio::awaitable<void> show_all(client& requester, const bind_arguments& args) {
     printer out{args.format, true};
-    const auto options = args.feed.options(requester);
-    auto feed = co_await requester.node().async_bind(args.feed.noun, options);
-    for (std::uint64_t shown = 0; args.feed.count == 0 || shown < args.feed.count;) {
-        const auto item = co_await feed.async_next();
-        if (item.has_value()) {
-            show(out, args, item);
-            ++shown;
-        } else {
-            note_event(args.feed.noun, item);
-        }
-    }
+    const auto show_one = [&](const std::string& noun, const bound_item& item) { show(out, args, noun, item); };
+    co_await follow_values(requester, args.feed, show_one);
 }
 
 } // namespace
@@ -79,21 +89,29 @@ asio::awaitable<void> follow(client& requester, const bind_arguments& args) {
 void add_bind(CLI::App& app, context& shared) {
     auto args = std::make_shared<bind_arguments>();
     auto* command = app.add_subcommand("bind", "Get updates as they are published");
-    args->feed.add_options(*command, "Number of updates, including the last value; 0: until interrupted (default 0)");
+    args->feed.add_options(*command, "Number of updates, including the last value; 0: until interrupted (default 0)")
+        ->required();
+    command->add_flag("--wait", args->feed.waits, "Wait for nodes and nouns that are not there yet");
     add_output_option(*command, args->format);
     refuse_body(*command, "BIND");
-    command->footer("Missed updates, and a publisher that is lost or returns, are reported on stderr.\n\n"
-                    "Examples:\n"
-                    "  cles bind car1:localization\n"
-                    "  cles bind car1:localization --every 1s -n 10\n"
-                    "  cles bind all:localization\n"
-                    "  cles bind car1:localization --multicast eth0\n"
-                    "  cles bind car1:localization -o json | jq -c '[.lat,.lon]'");
+    command->footer(
+        "In a pattern, * stands for any characters of a name or a parameter, and /** at the end for all\n"
+        "that may follow. The nouns are those that nodes publish at the start; with --wait also those that\n"
+        "come later. Of several nouns, each update is shown with its noun.\n"
+        "Missed updates, and a publisher that is lost or returns, are reported on stderr.\n\n"
+        "Examples:\n"
+        "  cles bind car1:localization\n"
+        "  cles bind car1:localization --every 1s -n 10\n"
+        "  cles bind all:localization\n"
+        "  cles bind car1:localization car2:notice 'car1:tyre/**'\n"
+        "  cles bind 'all:loc*' --wait\n"
+        "  cles bind car1:localization --multicast eth0\n"
+        "  cles bind car1:localization -o json | jq -c '[.lat,.lon]'");
     command->callback([args, &shared] {
         args->feed.check();
-        client requester{args->feed.addresses, shared.verbosity, args->feed.is_multicast()};
+        client requester{args->feed.addresses, shared.verbosity, args->feed.uses_multicast()};
         args->feed.prepare(requester);
-        shared.exit_code = requester.run(follow(requester, *args));
+        shared.exit_code = requester.run(show_all(requester, *args));
     });
 }
 

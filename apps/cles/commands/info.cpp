@@ -3,6 +3,7 @@
 
 #include "client/client.hpp"
 #include "commands.hpp"
+#include "commands/task_types.hpp"
 #include "discovery/stated_endpoints.hpp"
 #include "options/arguments.hpp"
 #include "options/common_options.hpp"
@@ -41,6 +42,7 @@ BOOST_DESCRIBE_STRUCT(task_document, (), (verb, task, description, parameters))
 
 struct node_document {
     std::string node;
+    std::optional<std::string> pool;
     std::optional<std::string> version;
     std::optional<int> protocol;
     std::optional<std::string> epoch;
@@ -48,7 +50,7 @@ struct node_document {
     std::optional<std::vector<std::string>> endpoints;
     std::vector<task_document> tasks;
 };
-BOOST_DESCRIBE_STRUCT(node_document, (), (node, version, protocol, epoch, uptime_ms, endpoints, tasks))
+BOOST_DESCRIBE_STRUCT(node_document, (), (node, pool, version, protocol, epoch, uptime_ms, endpoints, tasks))
 
 struct info_arguments {
     address_book addresses;
@@ -64,6 +66,9 @@ std::string details_of(const node_document& node) {
         out.append(bold(stream::out, name)).append(11 - name.size(), ' ').append(printable(value)).append("\n");
     };
     add("node", node.node);
+    if (node.pool) {
+        add("pool", *node.pool);
+    }
     if (node.version) {
         add("version", *node.version);
     }
@@ -146,19 +151,28 @@ asio::awaitable<void> show(client& requester, const info_arguments& args) {
 
 void add_info(CLI::App& app, context& shared) {
     auto args = std::make_shared<info_arguments>();
-    auto* command = app.add_subcommand("info", "Describe a node and what it offers");
-    command->add_option("node", args->node, "The name of a node, or a URL (default: the node at --at)")->type_name("");
+    auto* command = app.add_subcommand("info", "Describe a node and what it offers, or the types of a task");
+    command
+        ->add_option("node", args->node, "The name of a node, a URL, or the noun of a task (default: the node at --at)")
+        ->type_name("");
     args->addresses.add_options(*command);
     add_timeout(*command, args->timeout, "5s");
     add_output_option(*command, args->format);
     command->footer("Examples:\n"
                     "  cles info\n"
                     "  cles info tcp://10.0.0.7\n"
+                    "  cles info car1:localization   # members, types, units\n"
                     "  cles info --at unix:///run/car1.sock -o json | jq -r '.tasks[].task'");
     command->callback([args, &shared] {
-        args->noun = args->addresses.use_target(args->node);
+        const bool is_task = args->node.find("://") == std::string::npos && args->node.find(':') != std::string::npos;
+        if (is_task) {
+            check_noun(args->node);
+        }
+        args->noun = is_task ? args->node : args->addresses.use_target(args->node);
         client requester{args->addresses, shared.verbosity};
-        shared.exit_code = requester.run(show(requester, *args));
+        shared.exit_code =
+            requester.run(is_task ? show_task(requester, args->addresses, args->noun, args->timeout, args->format)
+                                  : show(requester, *args));
     });
 }
 

@@ -121,7 +121,9 @@ std::string tasks_text(const std::string& tasks) {
 std::string ls_table(const std::vector<listed_node>& nodes, bool tasks) {
     table out{"NODE", "STATE", "LOAD", "LAST SEEN", "ENDPOINTS"};
     const bool has_routes = std::ranges::any_of(nodes, [](const listed_node& node) { return node.hops != 1; });
+    const bool has_pool = std::ranges::any_of(nodes, [](const listed_node& node) { return !node.pool.empty(); });
     const std::size_t route_column = has_routes ? out.column("ROUTE") : 0;
+    const std::size_t pool_column = has_pool ? out.column("POOL") : 0;
     const std::size_t tasks_column = tasks ? out.column("TASKS") : 0;
     for (const auto& node : nodes) {
         out.row();
@@ -132,6 +134,9 @@ std::string ls_table(const std::vector<listed_node>& nodes, bool tasks) {
         out.set(4, node.endpoints.empty() ? "-" : printable(joined(node.endpoints, " ")));
         if (has_routes) {
             out.set(route_column, printable(node.route()));
+        }
+        if (has_pool) {
+            out.set(pool_column, printable(node.pool));
         }
         if (tasks) {
             out.set(tasks_column, node.tasks.empty() ? "(" + printable(node.error) + ")" : tasks_text(node.tasks));
@@ -144,6 +149,10 @@ void write_node(cles::json_writer& w, const listed_node& node, bool tasks) {
     w.begin_object();
     w.key("node");
     w.value(std::string_view{node.node});
+    if (!node.pool.empty()) {
+        w.key("pool");
+        w.value(std::string_view{node.pool});
+    }
     w.key("endpoints");
     w.begin_array();
     for (const auto& endpoint : node.endpoints) {
@@ -212,8 +221,15 @@ asio::awaitable<void> show(client& requester, const ls_arguments& args) {
         printer{args.format, false}.print(ls_json(nodes, args.tasks));
     }
     if (!found_any) {
+        const bool hears_others = co_await hears_other_pools(requester);
         note("no node has announced itself on " + joined(cles::interfaces_of(args.addresses.group())) +
-             "; --multicast selects other interfaces");
+             "; --multicast selects other interfaces" +
+             (args.addresses.is_secured()
+                  ? "; if the roster is an old one, a request with --at tls://HOST brings that of the node there"
+                  : ""));
+        if (hears_others) {
+            note("nodes of other pools announce themselves there: --pool NAME selects a pool");
+        }
     }
 }
 

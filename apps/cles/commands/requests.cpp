@@ -4,22 +4,29 @@
 #include <cles/verb.hpp>
 
 #include "client/client.hpp"
+#include "client/line_answers.hpp"
 #include "client/routed_request.hpp"
+#include "client/stdin_lines.hpp"
+#include "client/told_types.hpp"
 #include "commands.hpp"
 #include "discovery/find_nodes.hpp"
 #include "options/arguments.hpp"
 #include "options/common_options.hpp"
+#include "output/errors.hpp"
 #include "output/printer.hpp"
 #include "output/progress_line.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
+#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -40,45 +47,153 @@ struct request_arguments {
     output_format format = output_format::automatic;
     bool progress = false;
     bool urgent = false;
+    bool unchecked = false;
+    bool lines = false;
     std::uint32_t hops = 8;
 };
 
-asio::awaitable<void> send_all(client& requester, const request_arguments& args, std::string command) {
-    printer out{args.format, args.count != 1};
-    progress_line progress{args.progress};
-    auto options = requester.options_for(args.noun, args.timeout);
-    options.urgent(args.urgent).hops(args.hops);
-    if (args.verb == cles::verb::delegate && progress.is_wanted()) {
-        options.on_progress(
-            [&progress](double fraction, std::string_view details) { progress.show(fraction, details); });
-    }
-    std::vector<std::string> routers;
-    if (needs_router(args.addresses, args.noun)) {
-        auto found = co_await possible_routers(requester, args.addresses);
-        routers = std::move(found);
-    }
-    auto next = std::chrono::steady_clock::now();
-    for (std::uint64_t i = 0; args.count == 0 || i < args.count; ++i) {
-        if (i > 0 && args.interval.count() > 0) {
-            next += args.interval;
-            co_await requester.sleep_until(next);
+// Whether the node is asked for the type of the body before: if somebody wrote one, and it is one node.
+bool is_checked(const request_arguments& args) {
+    const auto target = target_of(args.noun);
+    return (args.body || args.lines) && !args.unchecked && target != "any" && target != "all";
+}
+
+// As long as the check may take: the request may still be in time.
+std::chrono::milliseconds time_to_check(const request_arguments& args) {
+    constexpr std::chrono::milliseconds most{1000};
+    return args.timeout ? std::min(*args.timeout, most) : most;
+}
+
+std::string does_not_fit(const std::string& noun, const std::string& why) {
+    return "the body does not fit " + noun + ": " + why + " ('cles info " + noun +
+           "' shows what it takes; --no-check sends it nevertheless)";
+}
+
+/// Sends the requests of one command.
+class request_sender {
+  public:
+    request_sender(client& requester, const request_arguments& args)
+        : requester_(requester), args_(args), options_(requester.options_for(args.noun, args.timeout)),
+          out_(args.format, args.count != 1 || args.lines), progress_(args.progress) {
+        options_.urgent(args.urgent).hops(args.hops);
+        if (args.verb == cles::verb::delegate && progress_.is_wanted()) {
+            options_.on_progress(
+                [this](double fraction, std::string_view details) { progress_.show(fraction, details); });
         }
-        const cles::json_text answer = co_await send_routed(requester, command, options, routers);
-        progress.clear();
-        out.print(answer.text);
+    }
+    request_sender(const request_sender&) = delete;
+    request_sender& operator=(const request_sender&) = delete;
+
+    /// The same body, as often as was asked for.
+    asio::awaitable<void> send_body(std::string body) {
+        co_await prepare();
+        if (const auto why = body_mismatch(schema_, body); !why.empty()) {
+            throw usage_error(does_not_fit(args_.noun, why));
+        }
+        auto next = std::chrono::steady_clock::now();
+        for (std::uint64_t i = 0; args_.count == 0 || i < args_.count; ++i) {
+            if (i > 0 && args_.interval.count() > 0) {
+                next += args_.interval;
+                co_await requester_.sleep_until(next);
+            }
+            co_await send(body);
+        }
+    }
+
+    /// The body in each line of stdin: the answer of one is printed before the next is sent.
+    asio::awaitable<void> send_lines() {
+        stdin_lines lines{requester_.context()};
+        line_answers answers;
+        co_await prepare();
+        for (;;) {
+            const std::optional<std::string> line = co_await lines.next();
+            if (!line) {
+                break;
+            }
+            const auto body = answers.take(lines.number(), *line);
+            if (body) {
+                co_await send_line(*body, answers);
+            }
+            if (!answers.failure().empty()) {
+                out_.print(answers.failure());
+            }
+        }
+        if (answers.first_failure()) {
+            std::rethrow_exception(answers.first_failure());
+        }
+    }
+
+  private:
+    // Finds a node that routes, and asks for the type of the body, where that is needed.
+    asio::awaitable<void> prepare() {
+        if (needs_router(args_.addresses, args_.noun)) {
+            auto found = co_await possible_routers(requester_, args_.addresses);
+            routers_ = std::move(found);
+        }
+        if (is_checked(args_)) {
+            auto asking = requester_.options_for(args_.noun, time_to_check(args_));
+            asking.hops(args_.hops);
+            auto told = co_await ask_for_body_schema(requester_, args_.verb, args_.noun, asking, routers_);
+            schema_ = std::move(told);
+        }
+    }
+
+    asio::awaitable<void> send(std::string body) {
+        std::string command{to_string(args_.verb)};
+        command.append(" ").append(args_.noun);
+        if (!body.empty()) {
+            command.append(" ").append(body);
+        }
+        const cles::json_text answer = co_await send_routed(requester_, command, options_, routers_);
+        progress_.clear();
+        out_.print(answer.text);
+    }
+
+    // A node that cannot be reached ends the command, and so does its interruption.
+    asio::awaitable<void> send_line(std::string body, line_answers& answers) {
+        if (const auto why = body_mismatch(schema_, body); !why.empty()) {
+            answers.refuse(does_not_fit(args_.noun, why));
+            co_return;
+        }
+        try {
+            co_await send(std::move(body));
+        } catch (const cles::error& e) {
+            if (requester_.is_ending() || e.code().category() != cles::error_category()) {
+                throw;
+            }
+            progress_.clear();
+            answers.fail(static_cast<cles::errc>(e.code().value()), e.message());
+        }
+    }
+
+    client& requester_;
+    const request_arguments& args_;
+    cles::call_options options_;
+    printer out_;
+    progress_line progress_;
+    std::vector<std::string> routers_;
+    std::string schema_; // of the body; empty: not known, or not to be checked
+};
+
+// The sender ends with the coroutine, so that its progress is erased before a failure is reported.
+asio::awaitable<void> send_requests(client& requester, const request_arguments& args, std::string body) {
+    request_sender sender{requester, args};
+    if (args.lines) {
+        co_await sender.send_lines();
+    } else {
+        co_await sender.send_body(std::move(body));
     }
 }
 
 int run_request(const request_arguments& args, int verbosity) {
     check_noun(args.noun);
-    std::string command{to_string(args.verb)};
-    command.append(" ").append(args.noun);
-    if (args.body) {
-        command.append(" ").append(read_body(*args.body));
+    if (args.lines && (args.body || args.count != 1)) {
+        throw usage_error("--lines cannot be combined with --data or --count: each line of stdin is a body");
     }
+    auto body = args.body ? read_body(*args.body) : std::string{};
     client requester{args.addresses, verbosity};
     requester.explain_failures_of(args.noun);
-    return requester.run(send_all(requester, args, std::move(command)));
+    return requester.run(send_requests(requester, args, std::move(body)));
 }
 
 void add_request(CLI::App& app, context& shared, cles::verb verb, const std::string& name, const std::string& help,
@@ -99,6 +214,9 @@ void add_request(CLI::App& app, context& shared, cles::verb verb, const std::str
         refuse_body(*command, "PULL");
     } else {
         command->add_option("-d,--data", args->body, "The body: JSON, @FILE, or - for stdin")->type_name("JSON");
+        command->add_flag("--lines", args->lines,
+                          "Send a request for each line of stdin, which is its body, and print a line for each");
+        command->add_flag("--no-check", args->unchecked, "Send the body without asking the node for its type first");
     }
     if (verb == cles::verb::delegate) {
         command->add_flag("--progress", args->progress,
@@ -124,7 +242,8 @@ void add_push(CLI::App& app, context& shared) {
                 "Examples:\n"
                 "  cles push car1:echo -d '{\"speed\":27.8}'\n"
                 "  cles push car1:echo -d @order.json\n"
-                "  jq -n '{speed:27.8}' | cles push car1:echo -d -");
+                "  jq -n '{speed:27.8}' | cles push car1:echo -d -\n"
+                "  jq -c '.[]' orders.json | cles push car1:echo --lines");
 }
 
 void add_delegate(CLI::App& app, context& shared) {

@@ -48,6 +48,7 @@ struct top_arguments {
     std::uint64_t count = 0;
     top_order order = top_order::load;
     bool pools = false;
+    bool tasks = false;
     output_format format = output_format::automatic;
 };
 
@@ -112,6 +113,7 @@ class live_view {
         try {
             const auto metrics = parse_json(answer.json);
             row.rate = rates_.update(row.node.node + " " + row.node.epoch, metrics, steady::now());
+            row.tasks = task_times_in(metrics);
             for (auto& pool : pools_in(row.node.node, metrics)) {
                 if (pool.state == "live" && !row.node.url().empty()) {
                     bridges_.try_emplace(std::move(pool.pool), row.node.url());
@@ -147,6 +149,7 @@ class live_view {
                 for (const auto& [node, metrics] : results->members) {
                     auto& row = add(node, {});
                     row.rate = rates_.update(row.node.node, metrics, steady::now());
+                    row.tasks = task_times_in(metrics);
                 }
             }
             if (const auto* const errors = outcome.find("errors")) {
@@ -164,18 +167,22 @@ class live_view {
         if (screen_) {
             const auto title = bold(stream::out, "cles top") + "  " + summary_of(rows_) + "  (every " +
                                to_text(args_.interval) + "; q quits)";
-            screen_->show(title + "\n" + printable(error_) + "\n" + to_table(rows_));
+            screen_->show(title + "\n" + printable(error_) + "\n" + tables());
             return;
         }
         if (!error_.empty()) {
             print_error(error_);
         }
         if (resolved(args_.format) == output_format::table) {
-            write_output((is_first_ ? "" : "\n") + to_table(rows_));
+            write_output((is_first_ ? "" : "\n") + tables());
         } else {
             printer{args_.format, false}.print(to_json(rows_));
         }
         is_first_ = false;
+    }
+
+    [[nodiscard]] std::string tables() const {
+        return to_table(rows_) + (args_.tasks ? "\n" + tasks_to_table(rows_) : std::string{});
     }
 
     client& requester_;
@@ -218,6 +225,7 @@ void add_top(CLI::App& app, context& shared) {
             "The order: load or name (default load)")
         ->type_name("WORD")
         ->check(CLI::IsMember({"load", "name"}).description(""));
+    command->add_flag("--tasks", args->tasks, "Also how long the handlers of each task take, the slowest first");
     command->add_flag("--pools", args->pools, "Also the nodes of other pools that these nodes reach as bridges");
     args->addresses.add_options(*command);
     add_output_option(*command, args->format);
@@ -227,6 +235,7 @@ void add_top(CLI::App& app, context& shared) {
                     "  cles top\n"
                     "  cles top --at tcp://10.0.0.7 --sort name\n"
                     "  cles top --pools\n"
+                    "  cles top --tasks\n"
                     "  cles top -n 2 -o json | jq -c '.nodes[] | [.node, .requests_per_s]'");
     command->callback([args, &shared] {
         args->addresses.check_discovery();

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <system_error>
 #include <tuple>
+#include <utility>
 
 namespace tool {
 namespace {
@@ -68,7 +69,43 @@ void write_rate(cles::json_writer& w, std::string_view name, const std::optional
     }
 }
 
+void write_tasks(cles::json_writer& w, const std::vector<task_time>& tasks) {
+    w.key("tasks");
+    w.begin_array();
+    for (const auto& each : tasks) {
+        w.begin_object();
+        w.key("task");
+        w.value(std::string_view{each.task});
+        w.key("verb");
+        w.value(std::string_view{each.verb});
+        w.key("samples");
+        w.value(each.samples);
+        w.key("p50_us");
+        w.value(rounded(each.p50_us, 3));
+        w.key("p99_us");
+        w.value(rounded(each.p99_us, 3));
+        w.end_object();
+    }
+    w.end_array();
+}
+
 } // namespace
+
+std::vector<task_time> task_times_in(const json_node& metrics) {
+    std::vector<task_time> out;
+    if (const auto* const tasks = metrics.find("tasks_us"); tasks != nullptr) {
+        for (const auto& [task, verbs] : tasks->members) {
+            for (const auto& [verb, times] : verbs.members) {
+                out.push_back({.task = task,
+                               .verb = verb,
+                               .samples = number_in<std::uint64_t>(times.find("samples")).value_or(0),
+                               .p50_us = number_in<double>(times.find("p50")).value_or(0),
+                               .p99_us = number_in<double>(times.find("p99")).value_or(0)});
+            }
+        }
+    }
+    return out;
+}
 
 node_rate node_rates::update(const std::string& run, const json_node& document, time_point now) {
     counters current{.when = now};
@@ -79,8 +116,9 @@ node_rate node_rates::update(const std::string& run, const json_node& document, 
     }
     current.errors = number_in<std::uint64_t>(document.find("errors")).value_or(0);
 
-    node_rate out{.moved_out = number_in<std::uint64_t>(document.find("jobs_moved_out")),
-                  .moved_in = number_in<std::uint64_t>(document.find("jobs_moved_in"))};
+    node_rate out{.moved_out =
+                      number_in<std::uint64_t>(document.find("jobs_moved_out")).value_or(0), // left out where it is 0
+                  .moved_in = number_in<std::uint64_t>(document.find("jobs_moved_in")).value_or(0)};
     if (const auto* times = document.find("handler_us");
         times != nullptr && number_in<std::uint64_t>(times->find("samples")).value_or(0) > 0) {
         out.p50_us = number_in<double>(times->find("p50"));
@@ -148,6 +186,28 @@ std::string to_table(const std::vector<top_row>& rows) {
     return out.text();
 }
 
+std::string tasks_to_table(const std::vector<top_row>& rows) {
+    std::vector<std::pair<const top_row*, const task_time*>> all;
+    for (const auto& row : rows) {
+        for (const auto& each : row.tasks) {
+            all.emplace_back(&row, &each);
+        }
+    }
+    std::stable_sort(all.begin(), all.end(),
+                     [](const auto& a, const auto& b) { return a.second->p99_us > b.second->p99_us; });
+    table out{"NODE", "VERB", "TASK", "SAMPLES", "P50", "P99"};
+    for (const auto& [row, each] : all) {
+        out.row();
+        out.set(0, printable(row->node.node));
+        out.set(1, printable(each->verb));
+        out.set(2, printable(each->task));
+        out.set(3, std::to_string(each->samples), true);
+        out.set(4, time_text(each->p50_us), true);
+        out.set(5, time_text(each->p99_us), true);
+    }
+    return out.text();
+}
+
 std::string to_json(const std::vector<top_row>& rows) {
     std::string out;
     cles::json_writer w{out};
@@ -158,6 +218,10 @@ std::string to_json(const std::vector<top_row>& rows) {
         w.begin_object();
         w.key("node");
         w.value(std::string_view{row.node.node});
+        if (!row.node.pool.empty()) {
+            w.key("pool");
+            w.value(std::string_view{row.node.pool});
+        }
         w.key("state");
         w.value(std::string_view{row.node.state});
         if (row.node.load) {
@@ -170,6 +234,9 @@ std::string to_json(const std::vector<top_row>& rows) {
         write_rate(w, "errors_per_s", row.rate.errors);
         write_rate(w, "handler_p50_us", row.rate.p50_us);
         write_rate(w, "handler_p99_us", row.rate.p99_us);
+        if (!row.tasks.empty()) {
+            write_tasks(w, row.tasks);
+        }
         w.key("age_ms");
         w.value(row.node.age_ms.value_or(0));
         if (!row.node.error.empty()) {

@@ -24,6 +24,18 @@ struct node_rate {
     std::optional<std::uint64_t> moved_in{};  ///< jobs of other nodes that it ran
 };
 
+/// How long the handlers of a task have taken, since the start of the node.
+struct task_time {
+    std::string task;
+    std::string verb;
+    std::uint64_t samples = 0;
+    double p50_us = 0;
+    double p99_us = 0;
+};
+
+/// From the reply to `PULL self:cles/metrics`; empty if the node does not tell.
+std::vector<task_time> task_times_in(const json_node& metrics);
+
 /// Keeps the last answer of each node.
 class node_rates {
   public:
@@ -49,6 +61,7 @@ class node_rates {
 struct top_row {
     listed_node node; ///< `error`: why its metrics are not known
     node_rate rate{};
+    std::vector<task_time> tasks{};
 };
 
 enum class top_order : std::uint8_t { load, name };
@@ -59,6 +72,8 @@ void sort_rows(std::vector<top_row>& rows, top_order order);
 /// A summary in one line.
 std::string summary_of(const std::vector<top_row>& rows);
 std::string to_table(const std::vector<top_row>& rows);
+/// The tasks of all nodes, the slowest first.
+std::string tasks_to_table(const std::vector<top_row>& rows);
 std::string to_json(const std::vector<top_row>& rows);
 
 } // namespace tool

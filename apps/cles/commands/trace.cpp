@@ -128,7 +128,8 @@ class tracer {
     // Asks one node; `failure_` says why there is no answer.
     asio::awaitable<std::optional<trace_document>> ask(std::string noun, std::string at) {
         cles::call_options options;
-        options.at(at).deadline(patience).diagnostics(failure_);
+        options.at(at, at == options_.at_ ? options_.at_node_ : std::string{});
+        options.deadline(patience).diagnostics(failure_);
         try {
             const cles::json_text answer = co_await requester_.node().async_pull(noun, options);
             co_return cles::from_json<trace_document>(answer.text);

@@ -2,6 +2,7 @@
 #include "completion/candidates.hpp"
 
 #include "discovery/host.hpp"
+#include "options/saved_contexts.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Error.hpp>
@@ -63,6 +64,14 @@ std::vector<candidate> interface_names() {
     return out;
 }
 
+std::vector<candidate> context_names() {
+    std::vector<candidate> out;
+    for (const auto& [name, each] : read_contexts().contexts) {
+        out.push_back({name, each.at});
+    }
+    return out;
+}
+
 enum class entries : std::uint8_t { all, folders };
 
 // The files at a path that has been typed, each after `before`.
@@ -118,6 +127,9 @@ std::vector<candidate> values_at(const cursor& cursor) {
     }
     if (kind == "JSON") {
         return bodies_at(cursor.typed);
+    }
+    if (kind == "CONTEXT") {
+        return context_names();
     }
     if (kind == "FILE" || kind == "DIR") {
         return files_at(cursor.typed, "", kind == "FILE" ? entries::all : entries::folders);

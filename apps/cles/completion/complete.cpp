@@ -35,6 +35,22 @@ constexpr auto budget = 80ms; // of 100 ms: the rest is for the shell, and for s
 
 using candidates = std::vector<candidate>;
 
+// Names come from other nodes: words that a shell could interpret are not offered.
+bool is_safe_character(char c) noexcept {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+           std::string_view{"_-.~+%/:@=,"}.find(c) != std::string_view::npos;
+}
+bool is_safe(const std::string& text) { return std::all_of(text.begin(), text.end(), is_safe_character); }
+
+bool is_json(const std::string& text) noexcept { return text.starts_with('{') || text.starts_with('['); }
+
+// The scripts quote JSON, so only what ends a quotation, or has a meaning in it, is dangerous.
+bool is_safe_json(const std::string& text) {
+    return is_json(text) && std::all_of(text.begin(), text.end(), [](char c) {
+               return is_safe_character(c) || std::string_view{"{}[]\" "}.find(c) != std::string_view::npos;
+           });
+}
+
 // --at, --peer and --multicast among the words that were typed.
 address_book addresses_in(std::vector<std::string> words) {
     address_book addresses;
@@ -63,6 +79,9 @@ class live_search {
         if (name == "noun") {
             return nouns();
         }
+        if (kind == "JSON") {
+            return cursor_.typed.empty() || is_json(cursor_.typed) ? bodies() : candidates{};
+        }
         if (name == "node" || name == "target") {
             return names("");
         }
@@ -78,10 +97,13 @@ class live_search {
   private:
     candidates nouns() {
         const auto colon = cursor_.typed.find(':');
+        if (cursor_.command->get_name() == "publish") { // of a node that does not run yet
+            return {};
+        }
         if (colon == std::string::npos) {
             auto out = names(":");
             out.push_back({"self:", "the node at the address of --at"});
-            if (const auto command = cursor_.command->get_name(); command != "bind" && command != "hz") {
+            if (!binds()) {
                 out.push_back({"any:", "a node that offers the task"});
             }
             out.push_back({"all:", "all nodes that offer the task"});
@@ -89,11 +111,29 @@ class live_search {
         }
         const auto node = cursor_.typed.substr(0, colon);
         const auto command = cursor_.command->get_name();
-        const auto verb = command == "hz" ? cles::verb::bind : cles::verb_from(command == "trace" ? traced() : command);
+        const auto verb = binds() ? cles::verb::bind : cles::verb_from(command == "trace" ? traced() : command);
         if (!verb || (node != "self" && has_no_nodes())) {
             return {};
         }
         return ask([&](client& requester) { return live_nouns(requester, addresses_, node, *verb, until_); });
+    }
+
+    [[nodiscard]] bool binds() const {
+        const auto command = cursor_.command->get_name();
+        return command == "bind" || command == "hz" || command == "sniff";
+    }
+
+    /// What the node of the noun takes.
+    candidates bodies() {
+        const auto verb = cles::verb_from(cursor_.command->get_name());
+        const auto noun = std::find_if(cursor_.words.begin(), cursor_.words.end(), [](const std::string& word) {
+            return word.find(':') != std::string::npos && word.find("://") == std::string::npos && is_safe(word);
+        });
+        if (!verb || noun == cursor_.words.end() || noun->starts_with("any:") || noun->starts_with("all:") ||
+            (!noun->starts_with("self:") && has_no_nodes())) {
+            return {};
+        }
+        return ask([&](client& requester) { return live_bodies(requester, *noun, *verb, until_); });
     }
 
     /// The verb in `cles trace VERB NOUN`.
@@ -159,14 +199,6 @@ candidates candidates_at(CLI::App& app, const cursor& cursor) {
     return out;
 }
 
-// Names come from other nodes: words that a shell could interpret are not offered.
-bool is_safe(const std::string& text) {
-    return std::all_of(text.begin(), text.end(), [](char c) {
-        return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-               std::string_view{"_-.~+%/:@=,"}.find(c) != std::string_view::npos;
-    });
-}
-
 } // namespace
 
 int complete(CLI::App& app, std::vector<std::string> words) {
@@ -174,7 +206,9 @@ int complete(CLI::App& app, std::vector<std::string> words) {
         const auto at = find_cursor(app, std::move(words));
         std::string text;
         for (const auto& each : candidates_at(app, at)) {
-            if (each.text.starts_with(at.typed) && is_safe(each.text)) {
+            // After "--data=", the scripts would not quote it.
+            const bool is_body = at.before.empty() && is_safe_json(each.text);
+            if (each.text.starts_with(at.typed) && (is_body || is_safe(each.text))) {
                 text.append(at.before).append(each.text).append("\t").append(printable(each.description)).append("\n");
             }
         }

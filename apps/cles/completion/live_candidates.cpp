@@ -5,6 +5,7 @@
 
 #include "client/client.hpp"
 #include "client/offered_tasks.hpp"
+#include "client/told_types.hpp"
 #include "discovery/ask_all.hpp"
 #include "discovery/find_nodes.hpp"
 #include "output/json_node.hpp"
@@ -116,6 +117,23 @@ asio::awaitable<std::vector<candidate>> live_nouns(client& requester, const addr
     }
     if (verb == cles::verb::pull && !found.empty()) {
         add_reserved(out, node);
+    }
+    co_return out;
+}
+
+asio::awaitable<std::vector<candidate>> live_bodies(client& requester, std::string noun, cles::verb verb,
+                                                    steady::time_point until) {
+    std::vector<candidate> out;
+    const auto options = requester.options_for(noun, time_left(until));
+    const std::vector<std::string> no_routers;
+    try {
+        const std::string answer = co_await ask_for_types(requester, noun, options, no_routers);
+        auto example = example_body(read_told_types(answer), verb);
+        if (!example.empty()) {
+            out.push_back({std::move(example), "an example"});
+        }
+    } catch (const cles::error&) {
+        out.clear(); // it tells none, or does not answer in time
     }
     co_return out;
 }

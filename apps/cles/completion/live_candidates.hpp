@@ -32,4 +32,8 @@ boost::asio::awaitable<std::vector<candidate>> live_nouns(client& requester, con
                                                           std::string node, cles::verb verb,
                                                           std::chrono::steady_clock::time_point until);
 
+/// An example of the body that the node takes for that noun and verb.
+boost::asio::awaitable<std::vector<candidate>> live_bodies(client& requester, std::string noun, cles::verb verb,
+                                                           std::chrono::steady_clock::time_point until);
+
 } // namespace tool

@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <string>
 #include <utility>
 
 namespace tool {
@@ -127,12 +128,28 @@ asio::awaitable<std::vector<std::string>> possible_routers(client& requester, co
 std::vector<listed_node> heard_nodes(client& requester) {
     auto nodes = nodes_of(requester.node().peers());
     for (auto& node : nodes) {
+        node.pool = requester.pool();
         // The command answers nobody, so it takes nothing from the node with its name.
         if (node.node == requester.node().name() && node.state == "clash") {
             node.state = "live";
         }
     }
     return nodes;
+}
+
+asio::awaitable<heard_datagrams> count_heard(client& requester) {
+    heard_datagrams out;
+    try {
+        out = co_await requester.node().async_pull<heard_datagrams>(requester.node().name() + ":cles/metrics");
+    } catch (const cles::error&) { // then the numbers are not known
+        out = {};
+    }
+    co_return out;
+}
+
+asio::awaitable<bool> hears_other_pools(client& requester) {
+    const auto heard = co_await count_heard(requester);
+    co_return heard.announcements_foreign != 0;
 }
 
 std::chrono::milliseconds time_left(steady::time_point until) {

@@ -4,8 +4,10 @@
 #include "discovery/listed_node.hpp"
 
 #include <boost/asio/awaitable.hpp>
+#include <boost/describe/class.hpp>
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -33,6 +35,20 @@ boost::asio::awaitable<std::vector<listed_node>> find_nodes_quickly(client& requ
 /// The nodes whose announcements the command has received. A node whose key the command uses is not in conflict with
 /// it.
 std::vector<listed_node> heard_nodes(client& requester);
+
+/// What the command's own node has counted in the group.
+struct heard_datagrams {
+    std::uint64_t datagrams_unsealed = 0;
+    std::uint64_t group_unopened = 0;
+    std::uint64_t announcements_foreign = 0;
+    std::uint64_t group_dropped = 0;
+};
+BOOST_DESCRIBE_STRUCT(heard_datagrams, (), (datagrams_unsealed, group_unopened, announcements_foreign, group_dropped))
+
+boost::asio::awaitable<heard_datagrams> count_heard(client& requester);
+
+/// Whether nodes of other pools announce themselves where the command listens.
+boost::asio::awaitable<bool> hears_other_pools(client& requester);
 
 /// Whether the noun starts with `any:` or `all:` and no address is given: a node that routes has to be found.
 bool needs_router(const address_book& addresses, std::string_view noun);

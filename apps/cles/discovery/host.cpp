@@ -6,16 +6,19 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
 #include <sstream>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include <arpa/inet.h>
 #include <ifaddrs.h>
 #include <net/if.h>
+#include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -88,16 +91,90 @@ std::string table_form(const cles::multicast_options& group) {
     return text.data();
 }
 
+using interface_addresses = std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)>;
+
+// Null if they cannot be determined.
+interface_addresses all_interface_addresses() {
+    ifaddrs* first = nullptr;
+    return {::getifaddrs(&first) == 0 ? first : nullptr, &::freeifaddrs};
+}
+
+// Of IPv4 and IPv6, without port and zone; otherwise empty.
+std::string_view address_bytes(const sockaddr* of) {
+    if (of != nullptr && of->sa_family == AF_INET) {
+        return {reinterpret_cast<const char*>(&reinterpret_cast<const sockaddr_in*>(of)->sin_addr), sizeof(in_addr)};
+    }
+    if (of != nullptr && of->sa_family == AF_INET6) {
+        return {reinterpret_cast<const char*>(&reinterpret_cast<const sockaddr_in6*>(of)->sin6_addr), sizeof(in6_addr)};
+    }
+    return {};
+}
+
+// 0.0.0.0 and :: lead to this host.
+bool is_loopback_or_unspecified(std::string_view bytes) {
+    constexpr auto is_zero = [](char c) { return c == 0; };
+    const bool is_v4_loopback = bytes.size() == sizeof(in_addr) && bytes.front() == 127;
+    const bool is_v6_loopback =
+        bytes.size() == sizeof(in6_addr) && bytes.back() == 1 && std::all_of(bytes.begin(), bytes.end() - 1, is_zero);
+    return is_v4_loopback || is_v6_loopback || std::all_of(bytes.begin(), bytes.end(), is_zero);
+}
+
+// Nothing if it is a name, and only addresses are wanted, or if it is not known.
+std::optional<host_addresses> look_up(const std::string& host, int flags) {
+    addrinfo hints{};
+    hints.ai_socktype = SOCK_STREAM; // each address once
+    hints.ai_flags = flags;
+    addrinfo* first = nullptr;
+    if (::getaddrinfo(host.c_str(), nullptr, &hints, &first) != 0) {
+        return std::nullopt;
+    }
+    const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> found{first, &::freeaddrinfo};
+    host_addresses result;
+    for (const auto* each = first; each != nullptr; each = each->ai_next) {
+        if (const auto bytes = address_bytes(each->ai_addr); !bytes.empty()) {
+            result.emplace_back(bytes);
+        }
+    }
+    return result;
+}
+
 } // namespace
 
-std::vector<network_interface> network_interfaces() {
-    ifaddrs* first = nullptr;
-    if (::getifaddrs(&first) != 0) {
-        return {};
+host_addresses own_addresses() {
+    const auto all = all_interface_addresses();
+    host_addresses result;
+    for (const auto* entry = all.get(); entry != nullptr; entry = entry->ifa_next) {
+        if (const auto bytes = address_bytes(entry->ifa_addr); !bytes.empty()) {
+            result.emplace_back(bytes);
+        }
     }
-    const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> all{first, &::freeifaddrs};
+    return result;
+}
+
+host_addresses addresses_of(const std::string& host) {
+    static std::map<std::string, host_addresses> names;
+    if (auto found = look_up(host, AI_NUMERICHOST)) {
+        return *std::move(found);
+    }
+    const auto [at, is_new] = names.try_emplace(host);
+    if (is_new) {
+        at->second = look_up(host, 0).value_or(host_addresses{});
+    }
+    return at->second;
+}
+
+bool leads_here(const host_addresses& found, const host_addresses& own) {
+    return std::any_of(found.begin(), found.end(), [&own](const std::string& each) {
+        return is_loopback_or_unspecified(each) || std::find(own.begin(), own.end(), each) != own.end();
+    });
+}
+
+bool is_own_host(const std::string& host) { return leads_here(addresses_of(host), own_addresses()); }
+
+std::vector<network_interface> network_interfaces() {
+    const auto all = all_interface_addresses();
     std::vector<network_interface> result;
-    for (const auto* entry = first; entry != nullptr; entry = entry->ifa_next) {
+    for (const auto* entry = all.get(); entry != nullptr; entry = entry->ifa_next) {
         const std::string name = entry->ifa_name;
         auto at = std::find_if(result.begin(), result.end(), [&](const auto& each) { return each.name == name; });
         if (at == result.end()) {

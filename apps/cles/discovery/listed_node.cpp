@@ -50,8 +50,9 @@ struct self_document {
     std::string epoch;
     std::vector<std::string> endpoints;
     std::optional<load_document> load;
+    std::optional<std::string> pool;
 };
-BOOST_DESCRIBE_STRUCT(self_document, (), (node, epoch, endpoints, load))
+BOOST_DESCRIBE_STRUCT(self_document, (), (node, epoch, endpoints, load, pool))
 
 } // namespace
 
@@ -124,6 +125,9 @@ std::vector<listed_node> nodes_of(std::string_view asked, std::string_view self,
     }
     auto known = peers_in(asked, peers);
     nodes.insert(nodes.end(), std::make_move_iterator(known.begin()), std::make_move_iterator(known.end()));
+    for (auto& node : nodes) { // it knows those of its own pool only
+        node.pool = document.pool.value_or("");
+    }
     return nodes;
 }
 

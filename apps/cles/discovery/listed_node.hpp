@@ -24,6 +24,7 @@ struct listed_node {
     std::string error{};                   ///< why it is not known
     unsigned hops = 1;                     ///< links to it from the node that lists it; 0: there is no route
     std::string via{};                     ///< the neighbour that the route leads through
+    std::string pool{};                    ///< empty: the unnamed pool, or not known
 
     /// The address at which to ask it, or empty.
     [[nodiscard]] std::string url() const { return endpoints.empty() ? std::string{} : endpoints.front(); }

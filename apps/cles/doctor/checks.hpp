@@ -57,8 +57,13 @@ class findings {
 /// Whether `clesd` accepts the configuration that it would use, which it checks itself.
 void check_configuration(findings& found);
 
-/// The key directory of the command, unless its name is empty. \return whether it can be used
-bool check_keys(const std::string& directory, findings& found);
+/// What the key directory of the command is good for.
+struct checked_key {
+    bool is_usable = true;
+    bool may_ask_group = true; ///< whether there may be a member that answers it there
+};
+/// The key directory of the command, unless its name is empty.
+checked_key check_keys(const std::string& directory, findings& found);
 
 /// The interfaces of this host, and those that multicast uses. `secured`: nodes are to have security.
 void check_interfaces(const cles::multicast_options& group, bool secured, findings& found);
@@ -73,6 +78,7 @@ boost::asio::awaitable<std::string> check_ports(client& requester, const address
 /// What earlier checks found that tells why no node announces itself.
 struct known_before {
     bool nobody_listens = false; ///< to the group, which is on loopback only
+    bool may_ask_group = true;   ///< what `check_keys` returned
     std::string at_port{};       ///< what `check_ports` returned
 };
 

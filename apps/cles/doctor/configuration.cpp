@@ -12,7 +12,6 @@
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -31,7 +30,6 @@ namespace {
 
 constexpr auto check_limit = 60s; // each plugin may take ten seconds
 constexpr std::size_t max_output = 64 * 1024;
-constexpr std::string_view not_required = " (it is not required)";
 
 [[noreturn]] void throw_system_error(int code) { throw std::system_error{code, std::generic_category()}; }
 
@@ -152,6 +150,12 @@ program_result run_program(const std::vector<std::string>& arguments, const std:
     return result;
 }
 
+// By a node that was started by hand, for example: who it is, is told for the ports.
+bool finds_address_in_use(const program_result& check) {
+    return check.code == 1 && !check.lines.empty() &&
+           check.lines.back().ends_with(std::generic_category().message(EADDRINUSE));
+}
+
 bool is_executable(const std::filesystem::path& program) {
     std::error_code code;
     return std::filesystem::is_regular_file(program, code) && ::access(program.c_str(), X_OK) == 0;
@@ -182,26 +186,31 @@ void check_configuration(findings& found) {
         return;
     }
     try {
-        auto [code, lines] = run_program({program, "--check"}, environment_without(""), check_limit);
+        auto check = run_program({program, "--check"}, environment_without(""), check_limit);
         // The variable is also that of the commands, for which it needs no permission.
         const char* group = std::getenv("CLES_MULTICAST");
         std::string advice;
-        if (code > 0 && group != nullptr && *group != '\0' && !lines.empty()) {
+        if (check.code > 0 && group != nullptr && *group != '\0' && !check.lines.empty() &&
+            !finds_address_in_use(check)) {
             auto without = run_program({program, "--check"}, environment_without("CLES_MULTICAST"), check_limit);
-            if (without.code == 0) {
+            if (without.code == 0 || finds_address_in_use(without)) {
                 advice = "with CLES_MULTICAST=" + std::string{group} +
-                         " in its environment, it does not start: " + lines.front();
-                std::tie(code, lines) = std::pair{without.code, without.lines};
+                         " in its environment, it does not start: " + check.lines.front();
+                check = std::move(without);
             }
         }
-        // The lines before the last one are about plugins without which the daemon starts.
-        while (code == 0 && lines.size() > 1 && lines.front().ends_with(not_required)) {
+        const bool in_use = finds_address_in_use(check);
+        auto& [code, lines] = check;
+        // The lines before the last one are about what the daemon starts without.
+        while ((code == 0 || in_use) && lines.size() > 1) {
             found.warning("config", lines.front(), "correct it, or remove it from the configuration");
             lines.erase(lines.begin());
         }
         const auto text = lines.empty() ? std::string{} : lines.front();
         if (code == 0) {
             found.ok("config", "clesd: " + text, advice);
+        } else if (in_use) {
+            found.ok("config", text, advice);
         } else if (code == -1) {
             found.failure("config", "clesd --check did not end by itself", "run " + program);
         } else {

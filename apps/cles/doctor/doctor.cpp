@@ -110,15 +110,16 @@ int run_checks(doctor_arguments& args, int verbosity) {
     args.addresses.check();
     findings found;
     check_configuration(found);
-    const bool can_ask = check_keys(args.addresses.keys(), found);
+    const auto key = check_keys(args.addresses.keys(), found);
     const auto group = args.addresses.group();
     check_interfaces(group, args.addresses.is_secured(), found);
     if (const auto usable = check_multicast(group, found); usable != cles::interfaces_of(group) || usable.empty()) {
         args.addresses.restrict_group_to(usable); // so that the remaining checks work
     }
-    if (can_ask) {
+    if (key.is_usable) {
         try {
-            known_before known{.nobody_listens = group.is_on() && has_no_listener(args.addresses.group())};
+            known_before known{.nobody_listens = group.is_on() && has_no_listener(args.addresses.group()),
+                               .may_ask_group = key.may_ask_group};
             client requester{args.addresses, verbosity};
             const auto code = requester.run(check_network(requester, args.addresses, known, found));
             if (code != exit_code::success) {
@@ -152,7 +153,7 @@ void add_doctor(CLI::App& app, context& shared) {
                     "Examples:\n"
                     "  cles doctor\n"
                     "  cles doctor -m eth0\n"
-                    "  cles doctor --keys /etc/cles/keys\n"
+                    "  cles doctor --keys /var/lib/cles/keys\n"
                     "  cles doctor --at tcp://10.0.0.7 -o json | jq -r '.findings[] | select(.verdict != \"ok\")'");
     command->callback([args, &shared] { shared.exit_code = run_checks(*args, shared.verbosity); });
 }

@@ -45,14 +45,6 @@ struct time_of_day {
 };
 BOOST_DESCRIBE_STRUCT(time_of_day, (), (seconds))
 
-/// What the command's own node has counted in the group.
-struct heard_datagrams {
-    std::uint64_t datagrams_unsealed = 0;
-    std::uint64_t announcements_foreign = 0;
-    std::uint64_t group_dropped = 0;
-};
-BOOST_DESCRIBE_STRUCT(heard_datagrams, (), (datagrams_unsealed, announcements_foreign, group_dropped))
-
 void check_node(const listed_node& node, const node_answer& answer, bool secured, findings& found) {
     if (node.state == "clash") {
         return; // reported by check_names
@@ -61,11 +53,9 @@ void check_node(const listed_node& node, const node_answer& answer, bool secured
         found.warning("nodes", node.node + " does not listen at an address that is reachable from this host",
                       secured ? "let it listen at an address of its network: --listen tls://0.0.0.0"
                               : "let it listen at an address of its network: --listen tcp://0.0.0.0 --insecure");
-    } else if (answer.code == cles::errc::denied && secured) {
-        found.failure("nodes", node.node + " denies what nodes ask each other: " + answer.error, advice_on_denial);
-    } else if (answer.code == cles::errc::denied) {
+    } else if (answer.code == cles::errc::denied) { // which may be as it should be
         found.warning("nodes", node.node + " denies what nodes ask each other: " + answer.error,
-                      "permit PULL 'cles' in its access rules");
+                      secured ? advice_on_denial : "permit PULL 'cles' in its access rules");
     } else if (!answer.error.empty()) {
         found.failure("nodes",
                       node.node + " announces itself, but does not reply at " + node.url() + ": " + answer.error,
@@ -234,30 +224,24 @@ bool is_on_loopback_only(const cles::multicast_options& group) {
     });
 }
 
-asio::awaitable<heard_datagrams> count_heard(client& requester) {
-    heard_datagrams out;
-    try {
-        out = co_await requester.node().async_pull<heard_datagrams>(requester.node().name() + ":cles/metrics");
-    } catch (const cles::error&) { // then the numbers are not known
-        out = {};
-    }
-    co_return out;
-}
-
 // Nobody has announced itself. Whether that is as it should be depends on what was received instead.
 asio::awaitable<void> report_none(client& requester, const address_book& addresses, const known_before& known,
                                   findings& found) {
     const auto heard = co_await count_heard(requester);
     const auto group = addresses.group();
     const auto on = " on " + joined(cles::interfaces_of(group));
-    if (addresses.is_secured() && heard.datagrams_unsealed != 0) {
+    if (addresses.is_secured() && heard.group_unopened != 0) {
         found.failure(
             "nodes", "no nodes found" + on + ", but datagrams that this key cannot open",
-            "they are of another fleet, of a newer roster, or of nodes without security: compare the fleet and "
-            "the roster that cles keys show prints for their directories and for this one");
+            "they are of another fleet, or of another roster: compare the fleet and the roster that cles keys "
+            "show prints for their directories and for this one");
+    } else if (addresses.is_secured() && heard.datagrams_unsealed != 0) {
+        found.failure("nodes", "no nodes found" + on + ", but datagrams that are not sealed",
+                      "they are of nodes without security, which are found without --keys");
     } else if (heard.announcements_foreign != 0) {
-        found.failure("nodes", "no nodes found" + on + ", but announcements of nodes of other pools",
-                      "set CLES_POOL to the pool that --pool of cles serve, or pool in clesd.yaml, gives them");
+        found.failure(
+            "nodes", "no nodes found" + on + ", but announcements of nodes of other pools",
+            "select with --pool or CLES_POOL the pool that --pool of cles serve, or pool in clesd.yaml, gives them");
     } else if (!addresses.is_secured() && heard.group_dropped != 0) {
         found.failure("nodes", "no nodes found" + on + ", but datagrams that cannot be read",
                       "if they are of nodes with security, give the key of a member of their fleet: --keys DIR");
@@ -285,6 +269,9 @@ asio::awaitable<std::vector<listed_node>> wait_for_nodes(client& requester, cons
     }
     auto late = co_await find_nodes(requester, addresses, steady::now() + announcement_interval, limit);
     for (const auto& node : late) {
+        if (!known.may_ask_group) { // so nobody has answered
+            break;
+        }
         found.failure("nodes", node.node + " is received, but does not receive what this host sends to the group",
                       "open incoming UDP port " + std::to_string(addresses.group().port) +
                           " in the firewall of its host, and outgoing in that of this one");

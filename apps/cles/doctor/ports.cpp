@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/error.hpp>
+#include <cles/identity.hpp>
 #include <cles/url.hpp>
 
 #include "client/client.hpp"
@@ -60,7 +61,7 @@ asio::awaitable<listener_or_error> identify(client& requester, cles::call_option
         out.denied = e.code() == cles::errc::denied;
         out.refused = e.code() == boost::system::errc::permission_denied &&
                       e.code().category() != cles::error_category() &&
-                      std::string_view{e.code().category().name()} != "cles.unix" && // this program's own refusal
+                      e.code().category() != cles::untrusted_listener_category() && // this program's own refusal
                       e.code().category() != boost::system::system_category();
         out.error = e.message().empty() ? e.code().message() : e.message();
     }
@@ -69,7 +70,7 @@ asio::awaitable<listener_or_error> identify(client& requester, cles::call_option
 
 void report_node(const std::string& url, const listener_or_error& node, findings& found) {
     if (node.denied && url.starts_with("tls:")) {
-        found.failure("ports", url + ": a node listens here, and denies it: " + node.error, advice_on_denial);
+        found.warning("ports", url + ": a node listens here, and denies it: " + node.error, advice_on_denial);
         return;
     }
     found.ok("ports", node.node.empty() ? url + ": a node listens here, and replies: " + node.error

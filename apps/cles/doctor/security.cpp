@@ -61,19 +61,21 @@ bool is_denied_by_all(const std::string& directory, const std::string& name, cle
     return others != 0;
 }
 
-// What a member needs in order to find nodes (docs/security.md, "Rights").
-void check_rights(const std::string& name, const std::string& directory, findings& found) {
+// What a member needs in order to find nodes (docs/security.md, "Rights"). Some members have fewer rights on purpose.
+// \return whether it may bind 'cles' of any
+bool check_rights(const std::string& name, const std::string& directory, findings& found) {
     const bool hears = !is_denied_by_all(directory, name, cles::verb::bind);
     const bool asks = !is_denied_by_all(directory, name, cles::verb::pull);
     if (hears && asks) {
-        return;
+        return true;
     }
     const std::string lacking = hears ? "PULL" : asks ? "BIND" : "BIND and PULL";
-    found.failure("keys",
+    found.warning("keys",
                   name + " may not " + lacking + " 'cles' of any other member, so it cannot find " +
                       (hears ? "out what they offer" : "them"),
                   "at the fleet's authority: cles fleet rights " + name +
                       " --may 'pull,bind *:cles' --may 'pull,push *:cles/peers', and its other rights");
+    return hears;
 }
 
 void check_locked_memory(findings& found) {
@@ -89,9 +91,10 @@ void check_locked_memory(findings& found) {
 
 } // namespace
 
-bool check_keys(const std::string& directory, findings& found) {
+checked_key check_keys(const std::string& directory, findings& found) {
+    checked_key key;
     if (directory.empty()) {
-        return true;
+        return key;
     }
     check_locked_memory(found);
     security::forbid_core_dumps();
@@ -100,13 +103,14 @@ bool check_keys(const std::string& directory, findings& found) {
         check_membership(node, directory, found);
         check_rules(node, directory, found);
         if (node.rights && node.rules_error.empty()) {
-            check_rights(node.name, directory, found);
+            key.may_ask_group = check_rights(node.name, directory, found);
         }
-        return node.rights.has_value();
+        key.is_usable = node.rights.has_value();
     } catch (const std::exception& e) {
         found.failure("keys", e.what(), "correct it, and run cles keys show --keys " + directory);
-        return false;
+        key.is_usable = false;
     }
+    return key;
 }
 
 } // namespace tool
@@ -115,11 +119,11 @@ bool check_keys(const std::string& directory, findings& found) {
 
 namespace tool {
 
-bool check_keys(const std::string& directory, findings& found) {
+checked_key check_keys(const std::string& directory, findings& found) {
     if (!directory.empty()) {
         found.failure("keys", "this cles was built without security", "use another one, or leave out --keys");
     }
-    return directory.empty();
+    return {.is_usable = directory.empty()};
 }
 
 } // namespace tool

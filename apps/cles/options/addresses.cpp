@@ -6,6 +6,8 @@
 #include <cles/url.hpp>
 
 #include "options/arguments.hpp"
+#include "options/pool_option.hpp"
+#include "options/saved_contexts.hpp"
 #include "output/errors.hpp"
 
 #include <CLI/App.hpp>
@@ -25,11 +27,11 @@ cles::multicast_options parse_group(const std::string& text, const std::string& 
 }
 
 // Of texts such as "car1=tcp://127.0.0.1:25370".
-std::map<std::string, std::string> pairs_of(const std::vector<std::string>& texts) {
-    std::map<std::string, std::string> out;
+std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std::string>& texts) {
+    std::vector<std::pair<std::string, std::string>> out;
     for (const auto& text : texts) {
         const auto equals = text.find('=');
-        out[text.substr(0, equals)] = text.substr(equals + 1);
+        out.emplace_back(text.substr(0, equals), text.substr(equals + 1));
     }
     return out;
 }
@@ -48,20 +50,23 @@ void multicast_option::add_to(CLI::App& command, const std::string& help) {
         ->type_name("IFACE[,IFACE...][,GROUP[:PORT]]|auto|off");
 }
 
-cles::multicast_options multicast_option::group(bool secured) const {
+cles::multicast_options multicast_option::group(bool secured, const std::string& saved) const {
     if (is_given()) {
         return parse_group(given_, "--multicast");
     }
     if (const char* variable = std::getenv("CLES_MULTICAST"); variable != nullptr && *variable != '\0') {
         return parse_group(variable, "CLES_MULTICAST");
     }
+    if (!saved.empty()) {
+        return parse_group(saved, "the multicast of the context");
+    }
     cles::multicast_options wanted{.interface = secured ? "auto" : "lo"};
     wanted.required = false;
     return wanted;
 }
 
-void multicast_option::restrict_to(const std::vector<std::string>& interfaces, bool secured) {
-    const auto all = group(secured);
+void multicast_option::restrict_to(const std::vector<std::string>& interfaces, bool secured, const std::string& saved) {
+    const auto all = group(secured, saved);
     given_ = interfaces.empty() ? "off" : joined(interfaces, ",") + "," + all.group + ":" + std::to_string(all.port);
 }
 
@@ -88,11 +93,54 @@ void address_book::add_options(CLI::App& command, const std::string& multicast_h
                            "With --keys, which member a user is, besides root and you, who listens at the Unix "
                            "socket of --at or --peer; may be repeated");
     user->type_name("USER=MEMBER")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    add_pool_option(command, pool_, "The pool of this command, which sees no nodes of others");
+}
+
+const saved_context& address_book::saved() const {
+    static const saved_context none{};
+    return is_in_context_ ? used_context() : none;
+}
+
+bool address_book::uses_saved_addresses() const {
+    const char* variable = std::getenv("CLES_AT");
+    return is_in_context_ && at_.empty() && peers_.empty() && (variable == nullptr || *variable == '\0');
 }
 
 std::string address_book::at() const {
+    if (uses_saved_addresses()) {
+        return saved().at;
+    }
     const char* variable = std::getenv("CLES_AT");
-    return at_.empty() && variable != nullptr ? variable : at_;
+    return is_in_context_ && at_.empty() && variable != nullptr ? variable : at_;
+}
+
+const std::vector<std::string>& address_book::peer_texts() const {
+    return uses_saved_addresses() ? saved().peers : peers_;
+}
+
+cles::multicast_options address_book::group() const { return multicast_.group(is_secured(), saved().multicast); }
+
+void address_book::restrict_group_to(const std::vector<std::string>& interfaces) {
+    multicast_.restrict_to(interfaces, is_secured(), saved().multicast);
+}
+
+std::string address_book::pool() const {
+    const auto chosen = pool_or_variable(pool_);
+    return chosen.empty() ? saved().pool : chosen;
+}
+
+std::string address_book::keys() const {
+    const auto directory = keys_.given_directory();
+    return directory.empty() ? saved().keys : directory;
+}
+
+saved_context address_book::given() const {
+    return {.at = at_,
+            .peers = peers_,
+            .keys = keys_.given(),
+            .local_users = local_users_,
+            .multicast = multicast_.given(),
+            .pool = pool_};
 }
 
 void address_book::check_url(const std::string& text) const {
@@ -113,7 +161,7 @@ void address_book::check() const {
     if (const auto url = at(); !url.empty()) {
         check_url(url);
     }
-    for (const auto& peer : peers_) {
+    for (const auto& peer : peer_texts()) {
         const auto equals = peer.find('=');
         const std::string_view name = std::string_view{peer}.substr(0, equals);
         if (equals == std::string::npos || !is_name(name)) {
@@ -142,16 +190,25 @@ void address_book::check_discovery() const {
     }
 }
 
-std::map<std::string, std::string> address_book::peers() const { return pairs_of(peers_); }
+std::map<std::string, std::string> address_book::peers() const {
+    std::map<std::string, std::string> out;
+    for (auto& [name, url] : pairs_of(peer_texts())) {
+        out.insert_or_assign(std::move(name), std::move(url));
+    }
+    return out;
+}
 
-std::map<std::string, std::string> address_book::local_users() const { return pairs_of(local_users_); }
+std::vector<std::pair<std::string, std::string>> address_book::local_users() const {
+    const bool is_saved_key = keys_.given_directory().empty();
+    return pairs_of(local_users_.empty() && is_saved_key ? saved().local_users : local_users_);
+}
 
 std::string address_book::url_for(std::string_view node) const {
     if (peers().contains(std::string{node})) {
         return {};
     }
     const auto url = at();
-    if (url.empty() && !peers_.empty()) {
+    if (url.empty() && !peer_texts().empty()) {
         throw cles::error(cles::errc::no_target, "there is no --peer '" + std::string{node} + "', and no --at");
     }
     if (finds_by_name() && node != "self" && node != "any" && node != "all") {

@@ -31,10 +31,11 @@ class multicast_option {
 
     /// On the command line; the environment does not count.
     [[nodiscard]] bool is_given() const noexcept { return !given_.empty(); }
-    /// \throws usage_error if it is invalid
-    [[nodiscard]] cles::multicast_options group(bool secured) const;
+    [[nodiscard]] const std::string& given() const noexcept { return given_; }
+    /// \param saved instead of the default; empty: none was saved. \throws usage_error if it is invalid
+    [[nodiscard]] cles::multicast_options group(bool secured, const std::string& saved = {}) const;
     /// Restricts multicast to these of its interfaces; none turns it off.
-    void restrict_to(const std::vector<std::string>& interfaces, bool secured);
+    void restrict_to(const std::vector<std::string>& interfaces, bool secured, const std::string& saved);
 
   private:
     std::string given_;
@@ -43,8 +44,12 @@ class multicast_option {
 /// "lo, eth0"
 std::string joined(const std::vector<std::string>& names, const char* separator = ", ");
 
+struct saved_context;
+
 /// --at, --peer and --multicast: where the command finds the nodes that it talks to. --keys: as whom it does so.
-/// --local-user: who may answer at Unix sockets then.
+/// --local-user: who may answer at Unix sockets then. --pool: the pool whose nodes it sees. What is given neither as an
+/// option nor in the environment is that of the context that is used, if there is one; its addresses count only if none
+/// was given.
 class address_book {
   public:
     void add_options(CLI::App& command,
@@ -57,20 +62,20 @@ class address_book {
 
     [[nodiscard]] std::map<std::string, std::string> peers() const;
     /// Without --at and --peer, nodes are found by their announcements, and `self` is at the default address.
-    [[nodiscard]] bool finds_by_name() const { return !has_url() && peers_.empty() && group().is_on(); }
+    [[nodiscard]] bool finds_by_name() const { return !has_url() && peer_texts().empty() && group().is_on(); }
     /// --at or CLES_AT is set.
     [[nodiscard]] bool has_url() const { return !at().empty(); }
     /// The multicast group, which not every command joins.
-    [[nodiscard]] cles::multicast_options group() const { return multicast_.group(is_secured()); }
+    [[nodiscard]] cles::multicast_options group() const;
     /// Restricts multicast to these interfaces; none turns it off.
-    void restrict_group_to(const std::vector<std::string>& interfaces) {
-        multicast_.restrict_to(interfaces, is_secured());
-    }
+    void restrict_group_to(const std::vector<std::string>& interfaces);
+    /// The pool of this command; empty: the unnamed pool.
+    [[nodiscard]] std::string pool() const;
     /// The directory with the key of this command; empty without security.
-    [[nodiscard]] std::string keys() const { return keys_.given_directory(); }
+    [[nodiscard]] std::string keys() const;
     [[nodiscard]] bool is_secured() const { return !keys().empty(); }
-    /// Which members other users of this host are: members by the names or ids of users.
-    [[nodiscard]] std::map<std::string, std::string> local_users() const;
+    /// Other users of this host, by name or id, and which member each is, as they were given.
+    [[nodiscard]] std::vector<std::pair<std::string, std::string>> local_users() const;
     /// Where a node of this host listens by default.
     [[nodiscard]] std::string_view default_node() const { return is_secured() ? default_secured_url : default_url; }
     /// --multicast was given.
@@ -87,8 +92,18 @@ class address_book {
     /// \return the noun that describes the node, "car1:cles". \throws usage_error if the argument is neither
     std::string use_target(const std::string& target);
 
+    /// What was given as options, to be saved.
+    [[nodiscard]] saved_context given() const;
+    /// These options are to be a context of their own: neither that which is used counts, nor CLES_AT.
+    void leave_context() noexcept { is_in_context_ = false; }
+
   private:
     [[nodiscard]] std::string at() const;
+    [[nodiscard]] const std::vector<std::string>& peer_texts() const;
+    /// The context that is used; empty if there is none.
+    [[nodiscard]] const saved_context& saved() const;
+    /// Whether no address was given, so that those of the context count.
+    [[nodiscard]] bool uses_saved_addresses() const;
     void check_url(const std::string& text) const;
 
     std::string at_;
@@ -96,6 +111,8 @@ class address_book {
     std::vector<std::string> local_users_;
     multicast_option multicast_;
     keys_option keys_;
+    std::string pool_;
+    bool is_in_context_ = true;
 };
 
 } // namespace tool

@@ -26,6 +26,15 @@ bool is_hex(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') ||
 
 bool is_name_character(char c) { return is_alphanumeric(c) || c == '_' || c == '-' || c == '.'; }
 
+/// Whether '*' stands for other characters, as in a pattern.
+enum class stars { none, allowed };
+
+bool is_name_or_pattern(std::string_view text, stars with) {
+    return !text.empty() && text.size() <= max_name && std::all_of(text.begin(), text.end(), [with](char c) {
+        return is_name_character(c) || (with == stars::allowed && c == '*');
+    });
+}
+
 [[noreturn]] void refuse_noun(std::string_view noun, const std::string& reason) {
     throw usage_error("'" + std::string{noun} + "': " + reason);
 }
@@ -44,7 +53,7 @@ bool is_text(std::string_view decoded) {
     return cles::is_valid_json(quoted + "\"]", 1);
 }
 
-void check_parameter(std::string_view noun, std::string_view parameter) {
+void check_parameter(std::string_view noun, std::string_view parameter, stars with) {
     if (parameter.empty()) {
         refuse_noun(noun, "a parameter is empty; a noun must not end in '/'");
     }
@@ -56,7 +65,7 @@ void check_parameter(std::string_view noun, std::string_view parameter) {
             std::from_chars(&parameter[i + 1], &parameter[i + 1] + 2, byte, 16);
             decoded.push_back(static_cast<char>(byte));
             i += 2;
-        } else if (is_name_character(c) || c == '~' || c == '+') {
+        } else if (is_name_character(c) || c == '~' || c == '+' || (with == stars::allowed && c == '*')) {
             decoded.push_back(c);
         } else {
             refuse_noun(noun, "the parameter '" + std::string{parameter} +
@@ -66,6 +75,28 @@ void check_parameter(std::string_view noun, std::string_view parameter) {
     if (!is_text(decoded)) {
         refuse_noun(noun, "the parameter '" + std::string{parameter} +
                               "' is not text: %HH may not be control characters, and have to be UTF-8 together");
+    }
+}
+
+void check_parts(std::string_view noun, stars with) {
+    const auto colon = noun.find(':');
+    if (colon == std::string_view::npos) {
+        refuse_noun(noun, "a noun is NODE:TASK or NODE:TASK/PARAMETER..., as in car1:localization");
+    }
+    if (!is_name_or_pattern(noun.substr(0, colon), with)) {
+        refuse_noun(noun, "the node before ':' must be 1 to 64 letters, digits, '_', '-', '.'");
+    }
+    auto rest = noun.substr(colon + 1);
+    const auto slash = rest.find('/');
+    if (!is_name_or_pattern(rest.substr(0, slash), with)) {
+        refuse_noun(noun, "the task after ':' must be 1 to 64 letters, digits, '_', '-', '.'");
+    }
+    if (std::ranges::count(rest, '/') > max_parameters) {
+        refuse_noun(noun, "it has more than " + std::to_string(max_parameters) + " parameters");
+    }
+    while (rest.find('/') != std::string_view::npos) {
+        rest.remove_prefix(rest.find('/') + 1);
+        check_parameter(noun, rest.substr(0, rest.find('/')), with);
     }
 }
 
@@ -85,33 +116,13 @@ std::string contents_of_file(const std::string& name) {
 
 } // namespace
 
-bool is_name(std::string_view text) {
-    return !text.empty() && text.size() <= max_name && std::all_of(text.begin(), text.end(), is_name_character);
-}
+bool is_name(std::string_view text) { return is_name_or_pattern(text, stars::none); }
 
 std::string_view target_of(std::string_view noun) { return noun.substr(0, noun.find(':')); }
 
-void check_noun(std::string_view noun) {
-    const auto colon = noun.find(':');
-    if (colon == std::string_view::npos) {
-        refuse_noun(noun, "a noun is NODE:TASK or NODE:TASK/PARAMETER..., as in car1:localization");
-    }
-    if (!is_name(noun.substr(0, colon))) {
-        refuse_noun(noun, "the node before ':' must be 1 to 64 letters, digits, '_', '-', '.'");
-    }
-    auto rest = noun.substr(colon + 1);
-    const auto slash = rest.find('/');
-    if (!is_name(rest.substr(0, slash))) {
-        refuse_noun(noun, "the task after ':' must be 1 to 64 letters, digits, '_', '-', '.'");
-    }
-    if (std::ranges::count(rest, '/') > max_parameters) {
-        refuse_noun(noun, "it has more than " + std::to_string(max_parameters) + " parameters");
-    }
-    while (rest.find('/') != std::string_view::npos) {
-        rest.remove_prefix(rest.find('/') + 1);
-        check_parameter(noun, rest.substr(0, rest.find('/')));
-    }
-}
+void check_noun(std::string_view noun) { check_parts(noun, stars::none); }
+
+void check_noun_pattern(std::string_view pattern) { check_parts(pattern, stars::allowed); }
 
 std::string read_body(const std::string& argument) {
     std::string text = argument;
@@ -124,6 +135,10 @@ std::string read_body(const std::string& argument) {
         text = contents_of_file(origin);
     }
 
+    return checked_body(text, origin);
+}
+
+std::string checked_body(std::string_view text, const std::string& origin) {
     std::string reason;
     if (!cles::is_valid_json(text, 32, &reason)) {
         throw usage_error(origin + " is not valid JSON: " + reason);

@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -38,12 +39,17 @@ std::chrono::milliseconds parse_duration(std::string_view text) {
     const auto us = read_microseconds(text, "s");
     if (!us) {
         throw usage_error("'" + std::string{text} +
-                          "' is not a duration: write 500us, 500ms, 2s, 1min, 1h, or seconds as in 0.5");
+                          "' is not a duration: write 500ms, 2s, 1min, 1h, or seconds as in 0.5");
     }
     if (*us > static_cast<double>(std::chrono::microseconds{24h}.count())) {
         throw usage_error("'" + std::string{text} + "' is longer than a day");
     }
-    return std::chrono::milliseconds{std::llround(*us / 1e3)};
+    const auto ms = std::round(*us / 1e3);
+    constexpr double inexact = 1e-4; // a day in microseconds has 11 digits, and a double 15
+    if (std::abs(*us / 1e3 - ms) > inexact) {
+        throw usage_error("'" + std::string{text} + "' is not a whole number of milliseconds");
+    }
+    return std::chrono::milliseconds{static_cast<std::int64_t>(ms)};
 }
 
 std::chrono::microseconds parse_wait(std::string_view option, std::string_view text) {

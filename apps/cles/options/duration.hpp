@@ -7,7 +7,7 @@
 
 namespace tool {
 
-/// Reads "500us", "500ms", "2s", "1.5min", "1h", or plain seconds: "2", "0.5". At most a day.
+/// Reads "500ms", "2s", "1.5min", "1h", or plain seconds: "2", "0.5". Whole milliseconds, and at most a day.
 /// \throws usage_error that says how to write it
 std::chrono::milliseconds parse_duration(std::string_view text);
 

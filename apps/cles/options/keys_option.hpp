@@ -25,6 +25,8 @@ class keys_option {
     [[nodiscard]] std::string directory() const;
     /// The directory of --keys or CLES_KEYS; empty without both.
     [[nodiscard]] std::string given_directory() const;
+    /// That of --keys.
+    [[nodiscard]] const std::string& given() const noexcept { return given_; }
 
   private:
     std::string given_;

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "serve/demo_node.hpp"
 
+#include <cles/types.hpp>
+
 #include "serve/demo_tasks.hpp"
+#include "system/system_time.hpp"
 
 #include <boost/describe.hpp>
 
@@ -14,13 +17,18 @@ namespace {
 
 /// The position and the motion of a vehicle, which the vehicles of a platoon exchange (paper, section 4.1).
 struct localization {
-    double utc = 0;          ///< seconds since 1970
-    double lat = 0;          ///< degrees
-    double lon = 0;          ///< degrees
-    double velocity = 0;     ///< m/s
-    double acceleration = 0; ///< m/s²
+    double utc = 0;
+    double lat = 0;
+    double lon = 0;
+    double velocity = 0;
+    double acceleration = 0;
 };
 BOOST_DESCRIBE_STRUCT(localization, (), (utc, lat, lon, velocity, acceleration))
+CLES_FIELD(localization, utc, "s", "since 1970")
+CLES_FIELD(localization, lat, "deg", "latitude, WGS 84", -90, 90)
+CLES_FIELD(localization, lon, "deg", "longitude, WGS 84", -180, 180)
+CLES_FIELD(localization, velocity, "m/s")
+CLES_FIELD(localization, acceleration, "m/s²")
 
 constexpr double centre_lat = 48.2208;
 constexpr double centre_lon = 11.7248;
@@ -62,10 +70,11 @@ void check_no_parameters(const cles::request& r) {
 
 } // namespace
 
-demo_node::demo_node(boost::asio::io_context& io, const cles::service_options& options, double rate)
-    : service_(io, options), timer_(io), next_(std::chrono::steady_clock::now()) {
+demo_node::demo_node(cles::service& by, double rate)
+    : service_(by), timer_(by.get_executor()), next_(std::chrono::steady_clock::now()) {
     register_localization();
     register_demo_tasks(service_);
+    sysinfo::register_system_time(service_);
     if (rate > 0) {
         period_ = std::chrono::nanoseconds{std::llround(1e9 / rate)};
         publish();
@@ -75,21 +84,21 @@ demo_node::demo_node(boost::asio::io_context& io, const cles::service_options& o
 void demo_node::stop() {
     stopped_ = true; // a timer that has already expired cannot be cancelled
     timer_.cancel();
-    service_.stop();
 }
 
 void demo_node::register_localization() {
     const cles::task_info info{.description = "The position of the vehicle: utc s, lat and lon degrees, velocity m/s, "
                                               "acceleration m/s2",
                                .idempotent = true};
-    service_.on_pull(
+    cles::typed_registrar tasks{service_};
+    tasks.on_pull(
         "localization",
         [](const cles::request& r) {
             check_no_parameters(r);
             return current_localization();
         },
         info);
-    service_.on_bind("localization", check_no_parameters, info);
+    tasks.on_bind<localization>("localization", check_no_parameters, info);
 }
 
 void demo_node::publish() {

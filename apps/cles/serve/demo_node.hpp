@@ -3,27 +3,27 @@
 
 #include <cles/service.hpp>
 
-#include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
 
 #include <chrono>
 
 namespace tool {
 
-/// A node to experiment with: a moving vehicle that publishes its position, and the tasks of demo_tasks.hpp.
+/// Makes a service a node to experiment with: a moving vehicle that publishes its position, and the tasks of
+/// demo_tasks.hpp.
 class demo_node {
   public:
     /// `rate`: publications of the localization per second; 0: it can only be pulled.
-    demo_node(boost::asio::io_context& io, const cles::service_options& options, double rate);
+    demo_node(cles::service& by, double rate);
 
-    cles::service& service() noexcept { return service_; }
+    /// Publishes no more.
     void stop();
 
   private:
     void register_localization();
     void publish();
 
-    cles::service service_;
+    cles::service& service_;
     boost::asio::steady_timer timer_;
     std::chrono::nanoseconds period_{0};
     std::chrono::steady_clock::time_point next_;

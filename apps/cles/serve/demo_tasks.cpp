@@ -4,6 +4,7 @@
 #include <cles/registrar.hpp>
 #include <cles/request.hpp>
 #include <cles/responder.hpp>
+#include <cles/types.hpp>
 
 #include <boost/asio/steady_timer.hpp>
 #include <boost/describe.hpp>
@@ -27,6 +28,7 @@ struct sleep_result {
     std::int64_t slept_ms = 0;
 };
 BOOST_DESCRIBE_STRUCT(sleep_result, (), (slept_ms))
+CLES_FIELD(sleep_result, slept_ms, "ms", "how long it has waited")
 
 constexpr std::int64_t max_ms = 86'400'000; // a day, the maximum of any deadline
 constexpr int parts = 10;
@@ -89,7 +91,8 @@ void sleep_job::wait_a_tenth() {
 
 } // namespace
 
-void register_demo_tasks(cles::registrar& tasks) {
+void register_demo_tasks(cles::registrar& to) {
+    cles::typed_registrar tasks{to};
     const auto body = [](const cles::request& r) { return cles::json_text{std::string{r.body()}}; };
     tasks.on_pull("echo",
                   [](const cles::request& r) {
@@ -102,7 +105,8 @@ void register_demo_tasks(cles::registrar& tasks) {
                       [](const cles::request& r, cles::responder answer) { sleep_job::start(r, std::move(answer)); },
                       {.description = "Waits that many milliseconds, and reports progress in tenths",
                        .parameters = {"ms"},
-                       .idempotent = true});
+                       .idempotent = true},
+                      {.result = cles::schema_of<sleep_result>()});
     tasks.on_delegate("fail",
                       [](const cles::request&) { throw cles::error(cles::errc::failed, "this task always fails"); },
                       {.description = "Always fails", .idempotent = true});

@@ -8,6 +8,6 @@ class registrar;
 namespace tool {
 
 /// The tasks of `cles serve` besides localization: echo, sleep, fail, notice.
-void register_demo_tasks(cles::registrar& tasks);
+void register_demo_tasks(cles::registrar& to);
 
 } // namespace tool

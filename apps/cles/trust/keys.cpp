@@ -160,6 +160,28 @@ void add_join(CLI::App& keys, context& shared) {
     run_with_keys(*command, shared, args, join);
 }
 
+// --- cert ---
+
+void write_certificate(const keys_arguments& args) {
+    const auto directory = args.keys.directory();
+    const auto file = security::write_certificate(directory);
+    write_output(printable(file) + "\n");
+    note("the file contains the private key, as 'key' does, and stays in " + directory);
+}
+
+void add_cert(CLI::App& keys, context& shared) {
+    auto args = std::make_shared<keys_arguments>();
+    auto* command = keys.add_subcommand("cert", "Write the key and its certificate for other programs, as PEM");
+    args->keys.add_to(*command, "The node's directory");
+    command->footer(
+        "Prints the path of the file, tls.pem in that directory, which only its owner can read. The Python\n"
+        "package needs it for tls://. It stays valid as long as the key.\n\n"
+        "Examples:\n"
+        "  cles keys cert\n"
+        "  cles keys cert --keys /etc/cles/car1");
+    run_with_keys(*command, shared, args, write_certificate);
+}
+
 } // namespace
 
 void add_keys(CLI::App& app, context& shared) {
@@ -172,6 +194,7 @@ void add_keys(CLI::App& app, context& shared) {
     add_new(*keys, shared);
     add_show(*keys, shared);
     add_join(*keys, shared);
+    add_cert(*keys, shared);
 }
 
 } // namespace tool

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "options/saved_contexts.hpp"
+
+#include "output/errors.hpp"
+
+#include <cerrno>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <system_error>
+
+namespace tool {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string variable_or_nothing(const char* name) {
+    const char* value = std::getenv(name);
+    return value == nullptr ? "" : value;
+}
+
+// Empty if there is no place for it.
+fs::path contexts_file() {
+    if (const auto configuration = variable_or_nothing("XDG_CONFIG_HOME"); !configuration.empty()) {
+        return fs::path{configuration} / "cles" / "contexts.json";
+    }
+    const auto home = variable_or_nothing("HOME");
+    return home.empty() ? fs::path{} : fs::path{home} / ".config" / "cles" / "contexts.json";
+}
+
+saved_context find_used_context() {
+    const char* chosen = std::getenv("CLES_CONTEXT");
+    if (chosen != nullptr && *chosen == '\0') { // none, whatever the file contains
+        return {};
+    }
+    const auto all = read_contexts();
+    const auto name = name_of_used_context(all);
+    if (name.empty()) {
+        return {};
+    }
+    const auto found = all.contexts.find(name);
+    if (found == all.contexts.end()) {
+        throw usage_error((chosen != nullptr ? "CLES_CONTEXT '" : "the context '") + name +
+                          "': there is no such context; 'cles context list' shows them");
+    }
+    return found->second;
+}
+
+} // namespace
+
+saved_contexts read_contexts() {
+    const auto path = contexts_file();
+    std::ifstream file{path, std::ios::binary};
+    if (std::error_code code; path.empty() || (!file && !fs::exists(path, code))) {
+        return {};
+    }
+    if (!file) { // otherwise those in it would be lost when it is replaced
+        throw usage_error("the contexts in " + path.string() + " cannot be read");
+    }
+    const std::string text{std::istreambuf_iterator<char>{file}, {}};
+    saved_contexts out;
+    std::string why;
+    if (!cles::from_json(text, out, &why)) {
+        throw usage_error("the contexts in " + path.string() + " cannot be read: " + why);
+    }
+    return out;
+}
+
+void write_contexts(const saved_contexts& all) {
+    const auto path = contexts_file();
+    if (path.empty()) {
+        throw std::runtime_error("where are contexts saved? Set HOME or XDG_CONFIG_HOME");
+    }
+    const auto fail = [&](const std::string& why) {
+        throw std::runtime_error("cannot write " + path.string() + ": " + why);
+    };
+    std::error_code code;
+    fs::create_directories(path.parent_path(), code);
+    if (code) {
+        fail(code.message());
+    }
+    auto made = path;
+    made += ".new";
+    {
+        std::ofstream file{made, std::ios::binary | std::ios::trunc};
+        file << cles::to_json(all) << '\n' << std::flush;
+        if (!file) {
+            fail(std::generic_category().message(errno));
+        }
+    }
+    fs::rename(made, path, code);
+    if (code) {
+        fail(code.message());
+    }
+}
+
+std::string name_of_used_context(const saved_contexts& all) {
+    const char* chosen = std::getenv("CLES_CONTEXT");
+    return chosen != nullptr ? chosen : all.used;
+}
+
+const saved_context& used_context() {
+    static const saved_context used = find_used_context();
+    return used;
+}
+
+} // namespace tool
