@@ -96,16 +96,19 @@ endif()
 
 # --- The programs ------------------------------------------------------------------------------------------------------
 
-foreach(program IN ITEMS cles_command cles_bench clesd)
+foreach(program IN ITEMS cles_command cles_bench cles_gateway clesd)
     if(TARGET ${program})
         install(TARGETS ${program} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
     endif()
 endforeach()
 
-# --- The daemon as a service ----------------------------------------------------------------------------------------------
+# --- The daemon and the gateway as services ----------------------------------------------------------------------------
 
 if(TARGET clesd)
     set(units clesd)
+    if(TARGET cles_gateway)
+        list(APPEND units cles-gateway)
+    endif()
     install(CODE "
         set(CLES_UNITS [[${units}]])
         set(CLES_SOURCE_DIR [[${PROJECT_SOURCE_DIR}]])

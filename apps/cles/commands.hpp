@@ -45,6 +45,7 @@ void add_help(CLI::App& app, context& shared);
 // of its own that it starts.
 
 void add_bench(CLI::App& app, char** words);
+void add_gateway(CLI::App& app, char** words);
 
 /// A description of the program and its commands.
 std::string overview_of(const CLI::App& app);

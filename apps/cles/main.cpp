@@ -105,6 +105,7 @@ int main(int argc, char** argv) {
         tool::add_serve(app, shared);
         tool::add_publish(app, shared);
         tool::add_respond(app, shared);
+        tool::add_gateway(app, argv + 1);
 #ifdef CLES_SECURITY
         tool::add_keys(app, shared);
         tool::add_fleet(app, shared);

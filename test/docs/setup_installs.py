@@ -19,7 +19,7 @@ OURS = re.compile(r"cles(d|-\w+)?$|(scripts|perf|build|\$|/tmp)/?")
 # Of the shell, coreutils, grep and sed.
 BASE = {"cat", "cd", "cp", "cut", "echo", "env", "export", "grep", "head", "kill", "ls", "printf", "rm", "sed", "sleep", "source", "test",
         "timeout", "true", "unset"}
-PACKAGES = {"c++": "g++", "cmake": "cmake", "ctest": "cmake", "nc": "netcat-openbsd", "pkg-config": "pkg-config",
+PACKAGES = {"c++": "g++", "cmake": "cmake", "ctest": "cmake", "curl": "curl", "nc": "netcat-openbsd", "pkg-config": "pkg-config",
             "python3": "python3", "ip": "iproute2"}
 
 

@@ -127,7 +127,8 @@ RESERVED_HEADERS = [
     (re.compile(r"boost/dll(\.hpp$|/)"), re.compile(r"runtime/src/plugins/plugin_library\.[ch]pp$"),
      "Boost.DLL belongs to runtime/plugins/plugin_library alone"),
     (re.compile(r"sodium(\.h$|/)"), re.compile(r"libcles/src/security/|test/security/|test/simulation/secured/"), "libsodium belongs to security alone"),
-    (re.compile(r"openssl/"), re.compile(r"libcles/src/tls/|libcles/src/nats/tls_watch\.cpp$|test/tls/|test/perf/sealed_pull\.cpp$"),
+    (re.compile(r"openssl/"), re.compile(r"libcles/src/tls/|libcles/src/nats/tls_watch\.cpp$|apps/gateway/access/tokens\.cpp$|test/tls/"
+                                         r"|test/perf/sealed_pull\.cpp$"),
      "OpenSSL belongs to tls alone"),
     # Others have inline functions of C, which some version of Debian 12 may write in a way that C++ does not read.
     (re.compile(r"linux/(?!(audit|capability|filter|if_tun|sched|seccomp)\.h$)"), re.compile(r"(?!)"),
@@ -135,7 +136,7 @@ RESERVED_HEADERS = [
     (re.compile(r"turbojpeg\.h$"), re.compile(r"plugins/fmv/frame_codec\.cpp$"), "libjpeg-turbo belongs to fmv/frame_codec.cpp alone"),
     (re.compile(r"node/secured/"), re.compile(r"libcles/src/(node/secured|api)/|test/"),
      "programs without security do not contain it: use node/security_protocol.hpp"),
-    (re.compile(r"(thread|future|boost/asio/thread_pool\.hpp)$"), re.compile(r"(?!apps/(cles|platoon)/)"),
+    (re.compile(r"(thread|future|boost/asio/thread_pool\.hpp)$"), re.compile(r"(?!apps/(cles|gateway|platoon)/)"),
      "but for its log, this program has one thread, so the thread sanitizer does not run its tests (test/CMakeLists.txt)"),
 ]
 
