@@ -128,7 +128,8 @@ endforeach()
 # --- The case studies --------------------------------------------------------------------------------------------------
 
 # Only installed by `cmake --install BUILD --component case_studies`.
-foreach(target IN ITEMS cles_dsgd cles_jadc2 cles_platoon cles_plugin_sgd cles_plugin_fmv cles_plugin_strike)
+foreach(target IN ITEMS cles_dsgd cles_jadc2 cles_platoon cles_plugin_digits cles_plugin_sgd cles_plugin_fmv
+        cles_plugin_strike)
     if(TARGET ${target})
         install(TARGETS ${target}
             RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT case_studies EXCLUDE_FROM_ALL

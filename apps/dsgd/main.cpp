@@ -1,17 +1,24 @@
 // SPDX-License-Identifier: BSL-1.0
-#include <cles/url.hpp>
-
+#include "check_arguments.hpp"
+#include "failure.hpp"
 #include "local.hpp"
+#include "neighbours/neighbours_command.hpp"
+#include "output/end_of_output.hpp"
 #include "pool.hpp"
+#include "rounds/rounds_command.hpp"
 #include "sgd/parallel.hpp"
 #include "trial.hpp"
+#include "verdict.hpp"
 
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <cstdio>
+#include <functional>
 
 namespace {
+
+using dsgd::report_failure;
 
 constexpr std::size_t default_shards = 4;
 
@@ -26,6 +33,7 @@ struct arguments {
 
 struct report {
     std::string error{};
+    std::string shortcoming{};    ///< of the result; empty if it is good
     double trial_ms = 0;          ///< contained in the elapsed time
     double trial_shortest_ms = 0; ///< the least time of a shard by which speeds were measured
     std::uint64_t trial_attempts = 0;
@@ -36,14 +44,8 @@ struct report {
     std::vector<sgd::trained> parts{};
 };
 BOOST_DESCRIBE_STRUCT(report, (),
-                      (error, trial_ms, trial_shortest_ms, trial_attempts, times, result, quality, shards, parts))
-
-int report_failure(const cles::error& why) {
-    const auto code = why.code();
-    std::fprintf(stderr, "cles-dsgd: %s\n", why.message().c_str());
-    const bool missing = code == cles::errc::no_target || code == cles::errc::no_task;
-    return missing ? 3 : code == cles::errc::deadline ? 4 : code == cles::errc::busy ? 6 : 5;
-}
+                      (error, shortcoming, trial_ms, trial_shortest_ms, trial_attempts, times, result, quality, shards,
+                       parts))
 
 int report_result(const arguments& args, const sgd::data_set& data, const dsgd::board& all,
                   const dsgd::trial* before = nullptr) {
@@ -59,10 +61,11 @@ int report_result(const arguments& args, const sgd::data_set& data, const dsgd::
         out.times = all.spent(out.trial_ms);
         out.result = average(out.parts);
         out.quality = judge(data, out.result);
+        out.shortcoming = dsgd::shortcoming(out.quality);
     }
     if (args.json) {
         std::puts(cles::to_json(out).c_str());
-        return all.failure() ? report_failure(*all.failure()) : 0;
+        return all.failure() ? report_failure(*all.failure()) : dsgd::report_shortcoming(out.shortcoming);
     }
     for (std::size_t i = 0; i < out.parts.size(); ++i) {
         std::printf("%-9s %7ju points  %9.3f ms  %s\n", out.shards[i].fate.c_str(),
@@ -78,13 +81,15 @@ int report_result(const arguments& args, const sgd::data_set& data, const dsgd::
     }
     std::printf("mse       %.7f; best possible %.7f; %.4f %% of the points in the wrong class\n", out.quality.mse,
                 out.quality.least_mse, out.quality.wrong * 100);
-    return 0;
+    return dsgd::report_shortcoming(out.shortcoming);
 }
 
 int run_local(const arguments& args, const sgd::order& setup) {
     const sgd::data_set data{*setup.data};
     const auto orders = orders_for(sgd::divide(data.size(), std::vector<double>(args.threads, 1)), setup);
     dsgd::board all{orders, {"here"}};
+    while (all.next(0)) {
+    }
     for (std::size_t i = 0; const auto& part : dsgd::train_here(data, orders)) {
         if (!sgd::is_finite(part.result)) {
             throw cles::error(cles::errc::failed, sgd::diverged);
@@ -119,6 +124,7 @@ int run(const arguments& args, sgd::order setup) {
         }
     }
     setup.data = common_data(offered, nodes);
+    pool.admit(*setup.data, nodes, args.nodes);
     const sgd::data_set data{*setup.data};
     const bool by_speed = args.weighted || args.resplit;
     const auto targets = args.nodes.empty() && !by_speed ? std::vector<std::string>{} : nodes;
@@ -158,34 +164,21 @@ int run(const arguments& args, sgd::order setup) {
     return report_result(args, data, all);
 }
 
-std::string wrong_url(const std::string& text) {
-    try {
-        cles::parse_url(text);
-        return {};
-    } catch (const cles::error& e) {
-        return e.message();
-    }
-}
-
-std::string wrong_rate(const std::string& text) {
-    double rate = 0;
-    const bool fits = CLI::detail::lexical_cast(text, rate) && rate >= 1e-12 && rate <= 1000; // false for NaN, too
-    return fits ? "" : "a number from 1e-12 to 1000";
-}
-
 } // namespace
 
 int main(int argc, char** argv) {
+    tool::check_output_at_exit("cles-dsgd", 5);
     arguments args;
     CLI::App app{"Distributed stochastic gradient descent: delegates shards of a data set, and averages.", "cles-dsgd"};
-    app.footer("Exit codes: 0 ok, 2 usage, 3 no node or no task, 4 deadline, 5 another error, 6 busy.");
+    app.footer("Exit codes: 0 ok, 2 usage, 3 no node or no task, 4 deadline, 5 another error, 6 busy, "
+               "7 a result that is not good.");
     auto* shards = app.add_option("-k,--shards", args.shards,
                                   "Number of shards, or with -r of those at one time (4; with -w or -r at least the "
                                   "number of nodes)")
                        ->check(CLI::Range(1, 1024));
     auto* at = app.add_option("--at", args.seeds, "A node that knows the others (tcp://127.0.0.1:25370)")
                    ->type_name("URL")
-                   ->check(wrong_url);
+                   ->check(dsgd::wrong_url);
     auto* nodes = app.add_option("-n,--nodes", args.nodes, "The nodes that train, in turn (default any)");
     nodes->delimiter(',');
     auto* weighted =
@@ -196,7 +189,7 @@ int main(int argc, char** argv) {
     auto* local =
         app.add_option("--local", args.threads, "Train here, in this number of threads")->check(CLI::Range(1, 1024));
     app.add_option("-e,--epochs", args.epochs, "Steps for each point (100)")->check(CLI::Range(1, 1'000'000));
-    app.add_option("--rate", args.rate, "Size of a step (0.0001)")->check(wrong_rate);
+    app.add_option("--rate", args.rate, "Size of a step (0.0001)")->check(dsgd::wrong_rate);
     app.add_option("--seed", args.seed, "Seed of the random numbers (1)")->check(CLI::NonNegativeNumber);
     auto* deadline = app.add_option("--deadline", args.deadline_s, "Deadline of a shard in seconds (60)")
                          ->check(CLI::Range(1, 86'400));
@@ -204,8 +197,14 @@ int main(int argc, char** argv) {
         local->excludes(of_nodes);
     }
     app.add_flag("--json", args.json, "Print a JSON object, and no progress");
+    std::function<int()> chosen; // a command
+    dsgd::add_rounds_command(app, chosen);
+    dsgd::add_neighbours_command(app, chosen);
     try {
         app.parse(argc, argv);
+        if (chosen) {
+            return chosen();
+        }
         const sgd::order setup{.epochs = args.epochs, .rate = args.rate, .seed = args.seed, .data = sgd::recipe{}};
         return args.threads != 0 ? run_local(args, setup) : run(args, setup);
     } catch (const CLI::ParseError& error) { // or --help

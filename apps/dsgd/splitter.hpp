@@ -34,6 +34,10 @@ class splitter {
     void done(std::size_t slot, double now_ms);
     /// The slot will not train its shard: all slots divide it again. It begins anew, because its node is another.
     void lost(std::size_t slot);
+    /// One more, which begins as the first ones did.
+    void add_slot() { slots_.emplace_back(); }
+    /// In points per millisecond; 0 if it is not known.
+    [[nodiscard]] double speed(std::size_t slot) const noexcept { return slots_[slot].speed; }
 
   private:
     struct slot_state {

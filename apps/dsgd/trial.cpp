@@ -35,7 +35,9 @@ trial::trial(std::uint64_t points, std::size_t shards, const sgd::order& work, s
 
 board trial::attempt() const {
     const auto even = sgd::divide(points_, std::vector<double>(weights_.size(), 1));
-    return {sgd::orders_for(even, what_), targets_};
+    board out{sgd::orders_for(even, what_), targets_};
+    out.late_after(late_factor);
+    return out;
 }
 
 void trial::take(const board& all) {

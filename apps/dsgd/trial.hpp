@@ -23,6 +23,9 @@ class trial {
     /// No attempt does more than the work, divided by this (but at least one epoch), because its result is not used.
     static constexpr std::uint64_t most_divisor = 4;
 
+    /// Nodes may be so many times as slow as others before their shards are given to another one.
+    static constexpr double late_factor = 20;
+
     /// \param work    with `epochs`: what is to be done afterwards
     /// \param targets the nodes, in turn; at least one
     trial(std::uint64_t points, std::size_t shards, const sgd::order& work, std::vector<std::string> targets);

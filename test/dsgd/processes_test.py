@@ -12,18 +12,19 @@ import time
 import unittest
 
 from daemon import DEFAULTS, Daemon, clean_environment, wait_until_running
-from support import PATIENCE, finish, wait_until
+from support import PATIENCE, finish, read_line, wait_until
 
 DSGD = os.environ["DSGD"]
 MINIMAL = os.environ["DSGD_MINIMAL"]
 PLUGIN = os.environ["SGD_PLUGIN"]
+HANGING = os.environ["HANGING_PLUGIN"]  # its workers answer only when they are withdrawn
 LONG, ENDLESS = "1000", "1000000"  # epochs: half a second or more for a shard, and longer than any test waits
 
 
-def node(name, *seeds, plugin=f"plugins: [{PLUGIN}]\n"):
+def node(name, *seeds, plugin=f"plugins: [{PLUGIN}]\n", workers=2):
     known = f"seeds: [{', '.join(seeds)}]\n" if seeds else ""
-    return Daemon("drain: 500ms\n" + known + plugin,
-                  base=DEFAULTS.replace("sat1", name).replace("level: debug", "level: info"))
+    base = DEFAULTS.replace("sat1", name).replace("level: debug", "level: info")
+    return Daemon("drain: 500ms\n" + known + plugin, base=base.replace("workers: 2", f"workers: {workers}"))
 
 
 def start(*arguments):
@@ -295,6 +296,55 @@ class Manager(unittest.TestCase):
             self.assertEqual(self.fates(report), ["failed"])
             wait_until_running(daemon, 0)
 
+    # -- nodes that hang, and nodes that join --------------------------------------------------------------------------
+
+    def test_a_late_shard_goes_to_another_node_as_well(self):
+        with node("sat1") as first, node("sat2", first.url, plugin=f"plugins: [{HANGING}]\n") as second:
+            wait_until(lambda: live_at(first) == {"sat2"} and live_at(second) == {"sat1"}, "both know each other")
+            for more in (["--nodes", "sat1,sat2"], []):
+                report, err = self.check(["--at", first.url, "-e", "30", "--deadline", "3600", *more])
+                self.assertEqual(self.fates(report), ["done"] * 4)
+                self.assertEqual({part["node"] for part in report["parts"]}, {"sat1"})
+                self.assertEqual(report["result"], trained_here("30"))
+                late = [i for i, shard in enumerate(report["shards"]) if shard["also"]]
+                if more:  # otherwise, sat1 may have had a free worker whenever a shard was sent
+                    self.assertEqual(late, [1, 3])
+                for i in late:
+                    self.assertRegex(err, rf"(?m)^cles-dsgd: shard {i + 1} is late: sat[12] gets it as well$")
+            wait_until_running(second, 0)  # its shards were withdrawn
+
+    def test_splitting_goes_on_without_a_node_that_hangs(self):
+        with node("sat1") as first, node("sat2", first.url, plugin=f"plugins: [{HANGING}]\n") as second:
+            wait_until(lambda: live_at(first) == {"sat2"} and live_at(second) == {"sat1"}, "both know each other")
+            report, _ = self.check(["--at", first.url, "-e", "30", "--deadline", "3600", "--resplit"])
+        self.assertEqual(set(self.fates(report)), {"done"})
+        self.assertEqual({part["node"] for part in report["parts"]}, {"sat1"})
+        self.assertEqual(sum(part["points"] for part in report["parts"]), 200_000)
+
+    def test_a_node_that_joins_gets_shards(self):
+        for more in (["-k", "70"], ["--resplit", "-k", "2"]):
+            with node("sat1", workers=1) as first:
+                manager = start("--at", first.url, "-e", ENDLESS, "--json", *more)
+                wait_until_running(first, 1)
+                with node("sat2", first.url) as second:
+                    self.assertEqual(read_line(manager, manager.stderr), "cles-dsgd: sat2 takes part from now on\n")
+                    wait_until_running(second, 2)
+                    manager.kill()
+                    manager.communicate(timeout=PATIENCE)
+
+    def test_a_result_that_is_not_good_is_told(self):
+        for arguments, words in ((["--local", "4", "-e", "1", "--rate", "0.00001"], "times the best possible. "),
+                                 (["--local", "1024", "-e", "1"], "times the best possible, and a constant does better. ")):
+            report, err = self.check(arguments, 7)
+            self.assertGreater(report["quality"]["mse"], report["quality"]["least_mse"] * 1.01)
+            self.assertIn(report["shortcoming"], err)
+            self.assertIn(words, err)
+            code, out, again = run(*arguments)
+            self.assertEqual((code, again), (7, err))
+            self.assertRegex(out, r"(?m)^mse ")
+        with node("sat1") as daemon:
+            self.check(["--at", daemon.url, "-k", "1024", "-e", "1"], 7)
+
     # -- what is missing -------------------------------------------------------------------------------------------------
 
     def test_no_node_is_there(self):
@@ -351,7 +401,7 @@ class Manager(unittest.TestCase):
                 code, out, err = run("--at", daemon.url, "-k", "3", *more)
                 self.assertEqual((code, out), (5, ""))
                 self.assertEqual(err, "cles-dsgd: 3 shards of 2 points: each takes at least one\n")
-            report, _ = self.check(["--at", daemon.url, "-k", "2"])
+            report, _ = self.check(["--at", daemon.url, "-k", "2"], 7)  # two points do not make a good classifier
             self.assertEqual(self.fates(report), ["done"] * 2)
             done = subprocess.run([MINIMAL, daemon.url, "3", "1", "sat1"], capture_output=True, text=True, check=False,
                                   env=clean_environment(), timeout=PATIENCE)

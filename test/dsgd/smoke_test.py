@@ -9,6 +9,7 @@ import subprocess
 import unittest
 
 from daemon import clean_environment, wait_until_running
+from digits_test import Files, ring
 from processes_test import ENDLESS, MINIMAL, PLUGIN, Cluster, kill, live_at, node, run, start
 from support import PATIENCE, finish, read_line, wait_until
 
@@ -128,6 +129,28 @@ class Smoke(unittest.TestCase):
                     wait_until(lambda at=daemon: "sat1" in live_at(at), "it knows the first node")
                 self.check_data(at)
                 self.check_lost(cluster, third)
+
+    def test_rounds_and_neighbours(self):
+        with Files(2) as files:
+            with node("sat1", plugin=files.plugin(1)) as first, node("sat2", first.url, plugin=files.plugin(2)) as second:
+                for daemon in (first, second):
+                    wait_until(lambda at=daemon: len(live_at(at)) == 1, "they know each other")
+                report, err = self.told("rounds", "--at", first.url, "--test", files.test, "--rounds", "3", code=7)
+                self.assertEqual([each["nodes"] for each in report["course"]], [["sat1", "sat2"]] * 3)
+                self.assertIn("it is not known whether the training has converged", err)
+                manager = start("rounds", "--at", first.url, "--test", files.test, "--rounds", "100000")
+                read_line(manager)
+                kill(second)
+                self.read_until(manager, "; the others go on\n")
+                kill(first)
+                self.assertEqual(finish(manager)[0], 5)
+            here, _ = self.told("rounds", "--local", f"{files.of(1)},{files.of(2)}", "--test", files.test, "--rounds", "6",
+                                "--evaluate", "0", code=7)
+            self.assertEqual(here["images"], 800 * 6)
+            for process in ring(self, files, 2, "--rounds", "6"):
+                code, out, err = finish(process)
+                self.assertIn(code, (0, 7), err)
+                self.assertRegex(out, r"(?m)^round +6 +2 nodes ")
 
     def check_lost(self, cluster, third):
         """One after the other is killed, until nobody is left."""
