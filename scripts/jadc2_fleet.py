@@ -18,6 +18,8 @@ from clean_environment import clean_environment  # noqa: E402
 from deferred_signals import DeferredSignals, first_line  # noqa: E402
 
 PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "30"))
+# Of a track, in seconds: the default of the programs, except under a sanitizer, which makes them slow.
+OLDEST_S = 2 if PATIENCE <= 30 else 12
 CONFIG = """\
 node: {name}
 listen: ["{scheme}://{address}:{port}"]
@@ -30,15 +32,17 @@ plugins: [{plugins}]
 # What each role may request, and what others may request of it. With PULL `cles` and `cles/peers`, nodes learn of each other
 # and of their tasks.
 FINDS = ["pull *:cles", "pull,push *:cles/peers"]
-SATELLITE = {"may": [], "offers": ["delegate,pull *:FMV_Processing", *FINDS]}
+SATELLITE = {"may": ["bind recon-camera:video", *FINDS],
+             "offers": ["delegate,pull *:FMV_Processing", "delegate *:FMV_Frame", *FINDS]}
 RIGHTS = {
     "sat1": SATELLITE,
     "sat2": SATELLITE,
-    "strike1": {"may": [], "offers": ["delegate,pull *:strike", *FINDS]},
+    "strike1": {"may": [], "offers": ["delegate,pull,push *:strike", *FINDS]},
     "recon": {"may": [], "offers": ["bind *:tracks", "push *:impact"]},
-    "recon-camera": {"may": ["delegate *:FMV_Processing", *FINDS], "offers": []},
-    "mission": {"may": ["bind recon:tracks", "push recon:impact", "delegate *:strike", *FINDS], "offers": []},
+    "recon-camera": {"may": ["delegate *:FMV_Processing", *FINDS], "offers": ["bind *:video", *FINDS]},
+    "mission": {"may": ["bind recon:tracks", "push recon:impact", "delegate,push *:strike", *FINDS], "offers": []},
     "operator": {"may": ["pull *:*", "pull *:*/**"], "offers": []},  # for questions about the outcome
+    "loader": {"may": ["delegate *:FMV_Frame"], "offers": []},  # measures how many frames a satellite can process
 }
 
 
@@ -243,20 +247,28 @@ class Teller(Process):
                                   f"{self.said_wrong()}")
 
     def order_by_hand(self, by=""):
-        """Acts as the operator (--operator): orders a strike on a target in the picture, detected by that node, and on
-        another target if that one is out of sight by then. Returns the decision."""
+        """Acts as an operator (--operator): orders and confirms a strike on a target in the picture, detected by that node, and on
+        another target if that one is out of sight by then; on one that was not attacked yet, if there is one. Returns the
+        decision."""
         after = self.told()
         while True:
             picture = self.wait_for("picture", after=after)
             after = self.events.index(picture, after) + 1
             targets = picture["data"]["tracks"] if by in ("", picture["data"]["by"]) else []
+            attacked = [each["data"]["target"] for each in self.all("decided")] + picture["data"].get("engaged", [])
+            fresh = [target for target in targets if target["id"] not in attacked]
             if targets:
                 after = self.told()
-                self.process.stdin.write(f"strike {targets[0]['id']}\n")
+                order = f"strike {fresh[0]['id']}" if fresh else f"strike {targets[0]['id']} again"
+                self.process.stdin.write(order + "\n")
                 self.process.stdin.flush()
-                answer = self.wait_for(("decided", "operator"), after=after)
-                if answer["event"] == "decided":
-                    return answer
+                if self.wait_for(("read_back", "operator"), after=after)["event"] == "read_back":
+                    after = self.told()
+                    self.process.stdin.write("confirm\n")
+                    self.process.stdin.flush()
+                    answer = self.wait_for(("decided", "operator"), after=after)
+                    if answer["event"] == "decided":
+                        return answer
 
     def told(self):
         with self.news:
@@ -332,14 +344,14 @@ class Fleet:
     def plugin(self, name):
         return os.path.abspath(os.path.join(self.programs, "..", "plugins", f"libcles-{name}.so"))
 
-    def satellite(self, name="sat1", role="satellite", plugins=None, port=0, more=""):
-        plugins = [self.plugin("fmv")] if plugins is None else plugins
+    def satellite(self, name="sat1", role="satellite", plugins=None, port=0, more="", seed=1):
+        """Starts a satellite whose radar sees the traffic of that seed."""
+        plugins = [f"{{path: {self.plugin('fmv')}, config: {{plots: true, seed: {seed}}}}}"] if plugins is None else plugins
         return Daemon(self, role, name, plugins, "recon", port, more)
 
     def striker(self, name="strike1", plugins=None, port=0, more="", seed=1):
-        """Starts a strike aircraft whose sensor sees the traffic of that seed, and that also accepts old tracks, so that a
-        busy machine does not cause refusals. In a secured fleet, orders must be signed."""
-        config = f"oldest_s: 60, seed: {seed}, must_be_signed: {str(self.secured).lower()}"
+        """Starts a strike aircraft whose sensor sees the traffic of that seed. In a secured fleet, orders must be signed."""
+        config = f"oldest_s: {OLDEST_S}, seed: {seed}, must_be_signed: {str(self.secured).lower()}"
         plugins = [f"{{path: {self.plugin('strike')}, config: {{{config}}}}}"] if plugins is None else plugins
         return Daemon(self, "strike", name, plugins, "mission", port, more)
 
@@ -347,8 +359,11 @@ class Fleet:
         """Starts a reconnaissance aircraft; its attribute `url` is the address at which it listens."""
         asked = [word for satellite in satellites for word in ("--satellite", getattr(satellite, "url", satellite))]
         at = listen or f"{self.scheme}://{self.hosts.address('recon', 'mission')}:0"
+        roles = dict.fromkeys(getattr(satellite, "role", "satellite") for satellite in satellites)  # a link to each
+        camera = [word for role in roles
+                  for word in ("--camera-listen", f"{self.scheme}://{self.hosts.address('recon', role)}:0")]
         open_to_all = ["--insecure"] if self.exposed else []
-        recon = Teller(self, "recon", "--listen", at, *open_to_all, *asked, *self.keys_option("recon"), *arguments,
+        recon = Teller(self, "recon", "--listen", at, *camera, *open_to_all, *asked, *self.keys_option("recon"), *arguments,
                        listener=self.listener)
         recon.url = recon.wait_for("listening")["text"].removeprefix("listening on ")
         return recon
@@ -356,7 +371,7 @@ class Fleet:
     def mission(self, recon, strikers, *arguments, stdin=subprocess.DEVNULL, key="mission"):
         """Starts a mission centre, with the key of `key` if the fleet is secured."""
         asked = [word for striker in strikers for word in ("--strike", getattr(striker, "url", striker))]
-        return Teller(self, "mission", "--recon", getattr(recon, "url", recon), *asked, *self.keys_option(key), *arguments,
+        return Teller(self, "mission", "--recon", getattr(recon, "url", recon), "--oldest", str(OLDEST_S), *asked, *self.keys_option(key), *arguments,
                       stdin=stdin, listener=self.listener)
 
     def reaches(self, role, url):

@@ -53,6 +53,7 @@ boost::asio::awaitable<void> give_orders(cles::service& from, const drill_option
     const auto run = "drill-" + run_id() + "-";
     auto next = steady::now();
     for (std::uint64_t i = 0; i < args.count + warm_up; ++i) {
+        const double now = utc_now();
         const strike::order what{.id = run + std::to_string(i),
                                  .lat = geo::traffic::origin.lat,
                                  .lon = geo::traffic::origin.lon,
@@ -60,7 +61,8 @@ boost::asio::awaitable<void> give_orders(cles::service& from, const drill_option
                                  .vn = -6,
                                  .sigma = 3,
                                  .sigma_v = 1,
-                                 .utc = utc_now(),
+                                 .utc = now,
+                                 .until = now + static_cast<double>(deadline_ms) / 1000,
                                  .drill = true};
         const auto begun = steady::now();
         const auto outcome = co_await from.async_delegate<strike::outcome>(noun, what, options);

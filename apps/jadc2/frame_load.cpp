@@ -50,7 +50,7 @@ boost::asio::awaitable<void> send_stream(work& all, std::string stream) {
                                       .camera = all.ground.reported(static_cast<double>(number % pictures) / fps),
                                       .format = all.args.format,
                                       .picture = all.pictures_sent[number % pictures]};
-        const auto seen = co_await all.from.async_delegate<fmv::found>("self:FMV_Processing", what, options);
+        const auto seen = co_await all.from.async_delegate<fmv::found>("self:FMV_Frame", what, options);
         ++all.done;
         all.run_ms += seen.run_ms;
         if (number == 0 && ++all.answered == all.args.streams) {

@@ -3,8 +3,10 @@
 #include "drill.hpp"
 #include "fmv/frame_codec.hpp"
 #include "frame_load.hpp"
+#include "fusion_comparison.hpp"
 #include "mission.hpp"
 #include "options/keys_option.hpp"
+#include "output/end_of_output.hpp"
 #include "output/errors.hpp"
 #include "recon.hpp"
 #include "rehearsal.hpp"
@@ -65,6 +67,7 @@ int run_recon(const CLI::App& command, jadc2::recon_options args, const std::str
         }
         take_name(command, keys, args.name);
         seal_default(command, "--listen", args.listen);
+        seal_default(command, "--camera-listen", args.camera_listen.front());
         seal_default(command, "--satellite", args.satellites.front());
     } else if (!args.camera_keys.empty()) {
         throw tool::usage_error("--camera-keys: needs --keys too");
@@ -110,13 +113,17 @@ CLI::App* add_recon(CLI::App& app, jadc2::recon_options& args) {
         ->type_name("DIR");
     r->add_option("-s,--satellite", args.satellites, "A node that processes video (tcp://127.0.0.1:25370)")
         ->type_name("URL");
+    r->add_option("--camera-listen", args.camera_listen,
+                  "Where satellites get the frames; may be repeated, once for each link (tcp://127.0.0.1:25372)")
+        ->type_name("URL");
     r->add_option("--seed", args.seed, "Seed of the scene; the strike aircraft's sensor has to have the same (1)")
         ->check(CLI::NonNegativeNumber);
     add_format(*r, args.format);
     r->add_option("--fps", args.fps, "Frames per second (25)")->check(CLI::Range(0.1, 200.0));
     r->add_option("--frames", args.frames, "Frames after which it ends; 0: no limit (0)")
         ->check(CLI::NonNegativeNumber);
-    r->add_option("--deadline", args.deadline_ms, "Deadline of a frame in milliseconds (1000)")
+    r->add_option("--deadline", args.deadline_ms,
+                  "Milliseconds for the result of a frame, after which another node goes on (1000)")
         ->check(CLI::Range(1, 60'000));
     r->add_flag("--json", args.json, "Print a JSON object for each event");
     return r;
@@ -131,9 +138,12 @@ CLI::App* add_mission(CLI::App& app, jadc2::mission_options& args) {
     m->add_option("--strikes", args.strikes, "Strikes after which it ends (1)")->check(CLI::Range(1, 1000));
     m->add_option("--age", args.age_s, "Seconds for which a target is followed before it is struck (0.6)")
         ->check(CLI::Range(0.0, 3600.0));
+    m->add_option("--oldest", args.oldest_s, "Seconds after which a picture is too old for an order (2)")
+        ->check(CLI::Range(0.1, 3600.0));
     m->add_option("--every", args.every_ms, "The minimum interval between pictures of the tracks in milliseconds (250)")
         ->check(CLI::Range(0, 60'000));
-    m->add_flag("--operator", args.has_operator, "Let an operator at the terminal decide");
+    m->add_flag("--operator", args.has_operator, "Let an operator at the terminal decide; otherwise a script decides");
+    m->add_option("--audit", args.audit, "A file to which all that happens is added")->type_name("FILE");
     m->add_option("--duration", args.duration_s, "Seconds after which it ends in any case; 0: no limit (0)")
         ->check(CLI::Range(0.0, 86'400.0));
     m->add_option("--deadline", args.deadline_ms, "Deadline of a strike in milliseconds (3000)")
@@ -160,6 +170,15 @@ CLI::App* add_rehearse(CLI::App& app, jadc2::rehearsal_options& args) {
     return r;
 }
 
+CLI::App* add_compare(CLI::App& app, jadc2::comparison_options& args) {
+    auto* c = app.add_subcommand("compare", "Measures how much more accurate tracks are if a satellite's own plots are "
+                                            "fused with the video, in simulated time and without a network");
+    c->add_option("-n,--scenes", args.scenes, "Scenes (20)")->check(CLI::Range(1, 10'000));
+    c->add_option("--seed", args.seed, "Seed of the first scene (1)")->check(CLI::NonNegativeNumber);
+    c->add_option("--seconds", args.seconds, "Length of each film (6)")->check(CLI::Range(3.0, 600.0));
+    return c;
+}
+
 CLI::App* add_load(CLI::App& app, jadc2::load_options& args) {
     auto* l = app.add_subcommand("load", "Sends frames to a node as fast as it answers");
     l->add_option("--at", args.at, "Address of the node (tcp://127.0.0.1:25370)")->type_name("URL");
@@ -173,11 +192,13 @@ CLI::App* add_load(CLI::App& app, jadc2::load_options& args) {
 } // namespace
 
 int main(int argc, char** argv) {
+    tool::check_output_at_exit("cles-jadc2", 5);
     jadc2::recon_options recon;
     jadc2::mission_options mission;
     jadc2::drill_options drill;
     jadc2::load_options load;
     jadc2::rehearsal_options rehearsal;
+    jadc2::comparison_options comparison;
     CLI::App app{"Joint command: a reconnaissance aircraft and a mission centre.", "cles-jadc2"};
     app.require_subcommand(1);
     const auto* as_recon = add_recon(app, recon);
@@ -185,20 +206,23 @@ int main(int argc, char** argv) {
     const auto* as_drill = add_drill(app, drill);
     const auto* as_load = add_load(app, load);
     const auto* as_rehearse = add_rehearse(app, rehearsal);
+    const auto* as_compare = add_compare(app, comparison);
     tool::keys_option keys;
     for (auto* command : app.get_subcommands({})) {
-        if (command != as_rehearse) {
+        if (command != as_rehearse && command != as_compare) {
             keys.add_optional_to(*command, keys_help);
         }
     }
     app.footer("With --keys, default addresses begin with tls:// instead of tcp://.\n\nExit codes: 0 ok, 2 usage, 3 no "
-               "node or no task, 4 deadline or unknown result, 5 another error, 6 busy.");
+               "node or no task, 4 deadline or unknown result, 5 another error, 6 busy, 7 an order "
+               "has missed.");
     try {
         app.parse(argc, argv);
         const auto directory = keys.given_directory();
         return as_recon->parsed()      ? run_recon(*as_recon, recon, directory)
                : as_mission->parsed()  ? run_mission(*as_mission, mission, directory)
                : as_rehearse->parsed() ? jadc2::print_rehearsal(rehearsal)
+               : as_compare->parsed()  ? jadc2::print_comparison(comparison)
                : as_drill->parsed()    ? jadc2::drill(sealed(*as_drill, drill, directory))
                                        : jadc2::run_load(sealed(*as_load, load, directory));
     } catch (const CLI::ParseError& error) { // or --help

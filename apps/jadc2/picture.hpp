@@ -3,6 +3,9 @@
 
 #include "fmv/messages.hpp"
 
+#include <optional>
+#include <vector>
+
 namespace jadc2 {
 
 /// What the reconnaissance aircraft publishes as `tracks`. Points in time are seconds since 1970 by its clock.
@@ -10,7 +13,8 @@ struct picture {
     std::string by{};      ///< the node that processed the frame; empty if there is none
     std::string trouble{}; ///< why there is none
     std::uint64_t frame = 0;
-    bool ready = false; ///< as in `fmv::found`
+    std::optional<std::uint64_t> missing{}; ///< frames before this one without tracks, since the last picture
+    bool ready = false;                     ///< as in `fmv::found`
     double captured = 0;
     double published = 0;
     double encode_ms = 0; ///< from capture until the frame was sent
@@ -18,9 +22,11 @@ struct picture {
     double queue_ms = 0;  ///< at the node
     double run_ms = 0;    ///< at the node
     std::vector<fmv::track> tracks{};
+    std::optional<std::vector<std::uint64_t>> engaged{}; ///< numbers of tracks that are under attack or hit
 };
 BOOST_DESCRIBE_STRUCT(picture, (),
-                      (by, trouble, frame, ready, captured, published, encode_ms, way_ms, queue_ms, run_ms, tracks))
+                      (by, trouble, frame, missing, ready, captured, published, encode_ms, way_ms, queue_ms, run_ms,
+                       tracks, engaged))
 
 /// PUSH recon:impact: where and when something struck, and what it was meant for. The answer says what is seen of it.
 struct impact {

@@ -32,7 +32,8 @@ void track_evaluation::begin(std::uint64_t number, double utc) {
     vehicles_.clear();
 }
 
-void track_evaluation::add(double utc, const std::vector<fmv::track>& tracks, bool ready) {
+void track_evaluation::add(double utc, const std::vector<fmv::track>& tracks, bool ready,
+                           const fmv::place_shift& corrected_by) {
     const auto motions = scene_.truth(utc);
     const geo::projection now{fmv::to_camera(scene_.reported(utc), scene::size, scene::plane())};
     std::vector<visible_vehicle> vehicles;
@@ -49,8 +50,10 @@ void track_evaluation::add(double utc, const std::vector<fmv::track>& tracks, bo
     std::vector<geo::plane_position> places;
     std::vector<fmv::point> seen;
     for (const auto& t : tracks) {
-        places.push_back(scene::plane().to_plane({.lat = t.lat, .lon = t.lon}));
-        seen.push_back(in_picture(*reported_view_, places.back()));
+        const auto place = scene::plane().to_plane({.lat = t.lat, .lon = t.lon});
+        places.push_back(place);
+        seen.push_back(in_picture(*reported_view_,
+                                  {.east = place.east + corrected_by.east, .north = place.north + corrected_by.north}));
     }
     const auto matches = score_.add(vehicles, seen);
     for (std::size_t k = 0; k < tracks.size(); ++k) {

@@ -12,8 +12,8 @@
 namespace jadc2 {
 
 /// Compares the tracks of a stream with the truth of its scene: whether vehicles are found, in pixels of the stream's
-/// first frame, where the constant error of the reported camera cancels; and how far they are from their places, in
-/// metres.
+/// first frame, where the constant error of the reported camera cancels, as it was before a correction; and how far
+/// they are from their places, in metres.
 class track_evaluation {
   public:
     explicit track_evaluation(const scene& of) : scene_(of), in_sight_(of.truth(0).size()) {}
@@ -21,7 +21,8 @@ class track_evaluation {
     /// A stream begins with this frame.
     void begin(std::uint64_t number, double utc);
     /// The tracks after a frame of it. \param ready whether its background is known
-    void add(double utc, const std::vector<fmv::track>& tracks, bool ready);
+    /// \param corrected_by what the camera's places were corrected by
+    void add(double utc, const std::vector<fmv::track>& tracks, bool ready, const fmv::place_shift& corrected_by = {});
 
     [[nodiscard]] const score& found() const noexcept { return score_; }
     /// The vehicle that a track of this stream followed last; nothing, if it followed none.

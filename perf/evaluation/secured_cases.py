@@ -66,7 +66,7 @@ def measure(options):
     drives, orders = {kind: [] for kind in DRIVES}, {kind: [] for kind in ORDERS}
     with Fleet(options.programs) as plain, Fleet(options.programs, rights=RIGHTS) as sealed, \
             Fleet(options.programs, rights=RIGHTS) as signed:
-        unsigned = f"{{path: {sealed.plugin('strike')}, config: {{oldest_s: 60}}}}"
+        unsigned = f"{{path: {sealed.plugin('strike')}, config: {{must_be_signed: false}}}}"
         nodes = {"plain": (plain, plain.striker()), "sealed": (sealed, sealed.striker(plugins=[unsigned])),
                  "signed": (signed, signed.striker())}
         for fleet, striker in nodes.values():  # warms up

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from . import bench_pictures, dsgd_picture, latency_pictures, peers, series_pictures, strike_picture
+from . import bench_pictures, decision_picture, dsgd_picture, latency_pictures, peers, series_pictures, strike_picture
 from .gnuplot import Missing
 
 BUSY = 0.2  # cores that other processes use; above this, figures are not reliable
@@ -28,6 +28,8 @@ def _kinds(section, raw):
     note = note_of(raw)
     if section == "bench":
         return bench_pictures.kinds(raw.get("series") or {}, note)
+    if section == "decision_latency" and "steps" in raw:
+        return decision_picture.kinds(raw, note)
     if section == "dsgd":
         return dsgd_picture.kinds(raw, note)
     if section == "latency" and "links" in raw:

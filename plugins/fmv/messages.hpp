@@ -4,6 +4,7 @@
 #include <boost/describe/class.hpp>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,7 +23,34 @@ struct camera_message {
 BOOST_DESCRIBE_STRUCT(camera_message, (),
                       (lat, lon, height, azimuth, depression, field_of_view, position_sigma, pointing_sigma))
 
-/// A frame of a stream, as `FMV_Processing` takes it.
+/// What `FMV_Processing` needs to begin receiving a video.
+struct video_message {
+    std::string frames{}; ///< the noun at the requester that is updated with each frame: "recon-camera:video"
+    int width = 0;        ///< pixels
+    int height = 0;
+    std::string format{}; ///< as in `frame_message`
+};
+BOOST_DESCRIBE_STRUCT(video_message, (), (frames, width, height, format))
+
+/// An update of that noun.
+struct video_frame {
+    std::uint64_t frame = 0; ///< as in `frame_message`, and so on
+    double utc = 0;
+    camera_message camera{};
+    std::string picture{}; ///< empty: the video has ended
+};
+BOOST_DESCRIBE_STRUCT(video_frame, (), (frame, utc, camera, picture))
+
+/// The result of `FMV_Processing` when the video has ended.
+struct video_result {
+    std::string node{};
+    std::uint64_t frames = 0;  ///< that were processed
+    std::uint64_t missing = 0; ///< since the first one
+    std::uint64_t bad = 0;     ///< that could not be processed
+};
+BOOST_DESCRIBE_STRUCT(video_result, (), (node, frames, missing, bad))
+
+/// A frame of a stream, as `FMV_Frame` takes it.
 struct frame_message {
     std::string stream{};    ///< whose frames belong together
     std::uint64_t frame = 0; ///< counted from the stream's first; some may be missing
@@ -50,15 +78,25 @@ struct track {
 };
 BOOST_DESCRIBE_STRUCT(track, (), (id, lat, lon, ve, vn, sigma, sigma_v, age, missed))
 
+/// A distance, m.
+struct place_shift {
+    double east = 0;
+    double north = 0;
+};
+BOOST_DESCRIBE_STRUCT(place_shift, (), (east, north))
+
 /// What was found in a frame.
 struct found {
     std::string node{};
     std::uint64_t frame = 0;
     bool ready = false; ///< the background is known; until then nothing is found
     std::vector<track> tracks{};
+    /// By how much the camera's places were wrong, as the node's own plots show: those of the tracks are corrected. If
+    /// it is missing, they are the camera's alone.
+    std::optional<place_shift> corrected_by{};
     double queue_ms = 0; ///< from the frame's arrival until work began
     double run_ms = 0;
 };
-BOOST_DESCRIBE_STRUCT(found, (), (node, frame, ready, tracks, queue_ms, run_ms))
+BOOST_DESCRIBE_STRUCT(found, (), (node, frame, ready, tracks, corrected_by, queue_ms, run_ms))
 
 } // namespace fmv

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "stream.hpp"
 
+#include "track_digits.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -12,13 +14,7 @@ namespace {
 constexpr double degree = std::numbers::pi / 180;
 constexpr double gain = 0.1; ///< of the correction: the pointing drifts slowly, and shakes from frame to frame
 constexpr double period_gain = 0.1;
-constexpr int most_unaligned = 50;       ///< two seconds of usual video
-constexpr double least_deviation = 0.01; ///< m and m/s: a track that claims to be exact cannot be fused
-
-// Fewer digits make a message shorter.
-double hundredths(double value) { return std::round(value * 1e2) / 1e2; }
-double deviation(double value) { return std::max(hundredths(value), least_deviation); }
-double to_a_centimetre(double degrees) { return std::round(degrees * 1e7) / 1e7; }
+constexpr int most_unaligned = 50; ///< two seconds of usual video
 
 } // namespace
 
@@ -38,6 +34,7 @@ void stream::begin(const camera_message& first) {
     map_.emplace(map{.plane = plane,
                      .grid = ground_grid{from, size_},
                      .deviation = geo::ground_deviation(from, first.position_sigma, first.pointing_sigma * degree)});
+    ++maps_;
     correction_ = {};
     unaligned_ = 0;
     still_ = background{size_};
@@ -86,8 +83,16 @@ void stream::take(const grey& frame, const camera_message& from, double utc) {
     watch(map_->grid.rectify(frame, to_camera(from, size_, map_->plane), correction_));
 }
 
+std::optional<stream::place_error> stream::error_of_places() const {
+    if (!map_) {
+        return std::nullopt;
+    }
+    return place_error{.map = maps_, .common = map_->deviation, .own = tracker::place_deviation * map_->grid.cell()};
+}
+
 std::vector<track> stream::tracks() const {
     std::vector<track> out;
+    const auto accuracy = error_of_places().value_or(place_error{});
     for (const auto& t : tracker_.confirmed()) {
         const auto at = map_->plane.to_geographic(map_->grid.to_ground(t.at));
         const auto velocity = map_->grid.movement(t.velocity);
@@ -96,8 +101,8 @@ std::vector<track> stream::tracks() const {
                        .lon = to_a_centimetre(at.lon),
                        .ve = hundredths(velocity.east),
                        .vn = hundredths(velocity.north),
-                       .sigma = deviation(std::hypot(map_->deviation, tracker::place_deviation * map_->grid.cell())),
-                       .sigma_v = deviation(tracker::velocity_deviation(period_) * map_->grid.cell()),
+                       .sigma = stated_deviation(std::hypot(accuracy.common, accuracy.own)),
+                       .sigma_v = stated_deviation(tracker::velocity_deviation(period_) * map_->grid.cell()),
                        .age = hundredths(t.age),
                        .missed = t.missed});
     }

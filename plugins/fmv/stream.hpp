@@ -8,6 +8,7 @@
 #include "registration.hpp"
 #include "tracker.hpp"
 
+#include <cstdint>
 #include <optional>
 
 namespace fmv {
@@ -36,6 +37,14 @@ class stream {
     [[nodiscard]] bool ready() const noexcept { return still_.known(); }
     /// The confirmed targets on the ground, at the time of the last frame.
     [[nodiscard]] std::vector<track> tracks() const;
+    /// How wrong their places are: standard deviations, per axis, m.
+    struct place_error {
+        std::uint64_t map = 0; ///< counts the maps: each has an error of its own that all its places have in common
+        double common = 0;     ///< of that error
+        double own = 0;        ///< of the rest
+    };
+    /// Nothing before the first frame.
+    [[nodiscard]] std::optional<place_error> error_of_places() const;
 
   private:
     struct map {
@@ -50,6 +59,7 @@ class stream {
 
     extent size_;
     std::optional<map> map_;
+    std::uint64_t maps_ = 0; ///< that were begun
     std::optional<double> utc_;
     double interval_ = 0; ///< between the last two frames, s
     double period_ = 0;   ///< the same, smoothed

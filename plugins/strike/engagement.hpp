@@ -3,6 +3,7 @@
 
 #include "order.hpp"
 #include "own_sensor.hpp"
+#include "target_filter.hpp"
 
 #include <cstdint>
 #include <optional>
@@ -28,9 +29,31 @@ struct aim {
     std::uint64_t plots = 0; ///< of its own sensor, that were taken for the target
 };
 
-/// Fuses the track of an order with what the aircraft's own sensor has seen, and aims. The track knows the velocity
-/// best, and which vehicle is meant; the own plots do not have the errors of the other aircraft's position and camera.
+/// What a place measured by the sensor may be away from where a target is predicted, and still be the target's: 0.997
+/// of a chi-squared distribution with two degrees of freedom.
+constexpr double gate = 11.8;
+
+/// The plot of a scan that is nearest to where a target is predicted, if it is within the gate; else null.
+const plot* nearest_plot(const scan& from, const target_filter& target);
+
+/// The target of an order, now.
+struct fused_target {
+    target_filter target;
+    std::uint64_t plots = 0; ///< of its own sensor, that were taken for the target
+    double misfit = 0;       ///< of these to the track: a squared Mahalanobis distance, of place and velocity
+    bool ambiguous = false;  ///< the plots of another vehicle fit nearly as well
+};
+
+/// Fuses the track of an order with what the aircraft's own sensor has seen. The track knows the velocity best, and
+/// which vehicle is meant; the own plots do not have the errors of the other aircraft's position and camera.
+fused_target fuse(const order& what, double now, const aircraft_state& own, own_sensor& sensor);
+
+/// Aims a weapon that is released now.
+/// \param plane whose origin is the aircraft
 /// \return nothing, if the target gets away
+std::optional<aim> aim_at(const fused_target& what, const aircraft_state& own, const geo::tangent_plane& plane);
+
+/// Fuses and aims.
 std::optional<aim> engage(const order& what, double now, const aircraft_state& own, own_sensor& sensor);
 
 } // namespace strike

@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <set>
 #include <string>
+#include <utility>
 
 namespace strike {
 
 /// The weapons that are left, and the orders that took the others: none is carried out twice.
 class magazine {
   public:
-    explicit magazine(std::size_t weapons) : left_(weapons) {}
+    /// \param before the orders that have taken some of these weapons already
+    explicit magazine(std::size_t weapons, std::set<std::string> before = {})
+        : left_(weapons - std::min(weapons, before.size())), orders_(std::move(before)) {}
 
     [[nodiscard]] std::size_t left() const noexcept { return left_; }
     [[nodiscard]] const std::set<std::string>& orders() const noexcept { return orders_; }

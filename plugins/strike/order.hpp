@@ -19,9 +19,12 @@ struct order {
     double sigma = 0;   ///< m, standard deviation of the place, per axis
     double sigma_v = 0; ///< m/s, the same of the velocity
     double utc = 0;
-    std::optional<bool> drill{}; ///< all but the release
+    double until = 0;                     ///< no weapon is released at this time or later
+    std::optional<bool> again{};          ///< even if the target has been attacked
+    std::optional<bool> drill{};          ///< all but the release, even where its sensor sees no target
+    std::optional<std::string> picture{}; ///< on which it is based, for the record
 };
-BOOST_DESCRIBE_STRUCT(order, (), (id, lat, lon, ve, vn, sigma, sigma_v, utc, drill))
+BOOST_DESCRIBE_STRUCT(order, (), (id, lat, lon, ve, vn, sigma, sigma_v, utc, until, again, drill, picture))
 
 /// What came of an order that was carried out.
 struct outcome {
@@ -37,5 +40,12 @@ struct outcome {
     double run_ms = 0;
 };
 BOOST_DESCRIBE_STRUCT(outcome, (), (node, order, aim_lat, aim_lon, sigma, plots, impact_utc, flight_s, left, run_ms))
+
+/// PUSH strike: what a person says of an order that is held.
+struct word_on_order {
+    std::string order{}; ///< its id
+    std::string say{};   ///< `confirm`, which has to come from another member than the order; or `abort`
+};
+BOOST_DESCRIBE_STRUCT(word_on_order, (), (order, say))
 
 } // namespace strike

@@ -20,7 +20,7 @@ class Demo(DemoCase):
         code, said, complaint = self.show(CLES_AT="nonsense", CLES_KEYS="nowhere")
         self.assertEqual((code, complaint), (0, ""), said)
         self.assertRegex(said, r"(?m)^    gap +\d+\.\d{3} m at least$")
-        self.assertRegex(said, r"(?m)^  mission: order mission-\d+-1 is done by strike1, 3 weapons left$")
+        self.assertRegex(said, r"(?m)^  mission: order mission-\d+-1 is released by strike1, 3 weapons left$")
         for member in ("recon", "operator"):
             self.assertIn(f"cles: denied: {member} may not send DELEGATE 'strike' to strike1", said)
 

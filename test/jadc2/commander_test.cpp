@@ -40,6 +40,34 @@ BOOST_AUTO_TEST_CASE(against_one_target_there_is_one_order) {
     BOOST_TEST(c.select_target(10).has_value());
 }
 
+BOOST_AUTO_TEST_CASE(what_others_attack_is_not_attacked) {
+    jadc2::commander c;
+    auto seen = picture_of({{.id = 1, .age = 20}, {.id = 2, .age = 12}});
+    seen.engaged = std::vector<std::uint64_t>{1};
+    c.set_picture(seen);
+    BOOST_TEST_REQUIRE(c.select_target(10).has_value());
+    BOOST_TEST(c.select_target(10)->id == 2U);
+    BOOST_TEST(c.is_attacked({.id = 1}));
+    BOOST_TEST(!c.is_attacked({.id = 2}));
+    seen.engaged->push_back(2);
+    c.set_picture(seen);
+    BOOST_TEST(!c.select_target(10));
+}
+
+BOOST_AUTO_TEST_CASE(an_order_needs_a_picture_that_is_not_old) {
+    jadc2::commander c;
+    auto seen = picture_of({{.id = 1, .age = 20}});
+    seen.captured = 100;
+    c.set_picture(seen);
+    const auto target = c.find(1).value();
+    BOOST_TEST(c.objection(target, false, 102, 2) == "");
+    BOOST_TEST(c.objection(target, true, 102.5, 2) == "the picture of target 1 is 2.5 s old: 2.0 at most");
+    c.ordered(target);
+    BOOST_TEST(c.objection(target, true, 102, 2) == "");
+    BOOST_TEST(c.objection(target, false, 102, 2) ==
+               "target 1 is under attack or hit: write strike 1 again, to attack it again");
+}
+
 BOOST_AUTO_TEST_CASE(a_target_is_found_by_its_number) {
     jadc2::commander c;
     c.set_picture(picture_of({{.id = 3, .lat = 7}}));
@@ -61,6 +89,31 @@ BOOST_AUTO_TEST_CASE(each_order_has_a_fate) {
     BOOST_TEST(c.fates().refused == 1U);
     BOOST_TEST(c.fates().failed == 1U);
     BOOST_TEST(c.fates().unknown == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(misses_count) {
+    jadc2::commander c;
+    BOOST_TEST(jadc2::exit_code_of(c.fates()) == 3); // none was given
+    const auto give = [&c](const std::string& fate) {
+        c.ordered({.id = 1});
+        c.ended(fate);
+    };
+    give("done");
+    c.assessed(true);
+    BOOST_TEST(jadc2::exit_code_of(c.fates()) == 0);
+    give("aborted");
+    BOOST_TEST(jadc2::exit_code_of(c.fates()) == 3);
+    give("done");
+    c.assessed(false);
+    BOOST_TEST(jadc2::exit_code_of(c.fates()) == 7);
+    give("failed");
+    BOOST_TEST(jadc2::exit_code_of(c.fates()) == 5);
+    give("done");
+    c.assessed(std::nullopt);
+    BOOST_TEST(jadc2::exit_code_of(c.fates()) == 4);
+    give("unknown");
+    BOOST_TEST(jadc2::text_of(c.fates()) ==
+               "6 orders: 3 released (1 hit, 1 missed, 1 not seen), 0 refused, 1 failed, 1 aborted, 1 unknown");
 }
 
 BOOST_AUTO_TEST_CASE(whether_it_was_carried_out_is_not_guessed) {

@@ -9,24 +9,34 @@
 #include "jadc2/scene.hpp"
 #include "support/answer.hpp"
 #include "support/asked_node.hpp"
+#include "support/run_until.hpp"
 
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <chrono>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <limits>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 namespace fmv_tasks {
 namespace {
 
+using cles::test::run_ready;
+using cles::test::run_until;
 using jadc2::scene;
 
 struct fixture : cles::test::asked_node {
     fixture() { fmv::register_tasks(node, {.streams = 2}); }
-    std::string send(const fmv::frame_message& what) {
-        return ask("DELEGATE self:FMV_Processing " + cles::to_json(what));
-    }
+    std::string send(const fmv::frame_message& what) { return ask("DELEGATE self:FMV_Frame " + cles::to_json(what)); }
     [[nodiscard]] fmv::frame_message frame(std::uint64_t number, const std::string& stream = "a") const {
         return {.stream = stream,
                 .frame = number,
@@ -41,6 +51,43 @@ struct fixture : cles::test::asked_node {
     static double time_of(std::uint64_t number) { return 1000 + static_cast<double>(number) * 0.04; }
 
     scene ground{1};
+};
+
+// The node films for itself: the next frame is published when there is a result of the last one.
+struct filming : fixture {
+    filming() {
+        node.on_bind("video", [this](const cles::request&) { ++bound; });
+    }
+    void open(const std::string& frames = "self:video") {
+        const fmv::video_message what{
+            .frames = frames, .width = scene::size.width, .height = scene::size.height, .format = "grey"};
+        const auto options = end.options().on_progress([this](double, std::string_view json) {
+            all.push_back(cles::from_json<fmv::found>(json));
+            if (on_result) {
+                on_result();
+            }
+        });
+        node.async_delegate<fmv::video_result>("self:FMV_Processing", what, options,
+                                               boost::asio::bind_cancellation_slot(stop.slot(), end.take()));
+        run_until(io, [&] { return bound == 1 || end.done(); });
+    }
+    void publish(std::uint64_t number, bool good = true) {
+        const auto whole = frame(number);
+        node.update("video", fmv::video_frame{.frame = number,
+                                              .utc = whole.utc,
+                                              .camera = whole.camera,
+                                              .picture = good ? whole.picture : "no picture"});
+    }
+    void publish_end(std::uint64_t number) { node.update("video", fmv::video_frame{.frame = number}); }
+    void until_results(std::size_t count) {
+        run_until(io, [&] { return all.size() == count; });
+    }
+
+    int bound = 0;
+    std::vector<fmv::found> all;
+    std::function<void()> on_result;
+    cles::test::answer<fmv::video_result> end;
+    boost::asio::cancellation_signal stop;
 };
 
 } // namespace
@@ -145,7 +192,7 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     BOOST_TEST(send(what) == "bad_request: node: stream: 1 to 64 characters");
     what.stream = std::string(65, 'a');
     BOOST_TEST(send(what) == "bad_request: node: stream: 1 to 64 characters");
-    BOOST_TEST(ask("DELEGATE self:FMV_Processing {}").starts_with("bad_request: node: the body is invalid: stream"));
+    BOOST_TEST(ask("DELEGATE self:FMV_Frame {}").starts_with("bad_request: node: the body is invalid: stream"));
     send(frame(0));
     what = frame(1);
     what.utc = frame(0).utc;
@@ -179,6 +226,84 @@ BOOST_AUTO_TEST_CASE(cameras_that_cannot_be_are_refused) {
     BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":0,"frames":0,"repeated":0,"refused":0,"bad":8})");
 }
 
+BOOST_FIXTURE_TEST_CASE(a_video_is_opened_once_and_each_frame_has_a_result, filming) {
+    constexpr std::uint64_t frames = 60;
+    std::uint64_t next = 0;
+    on_result = [&] { ++next < frames ? publish(next) : publish_end(next); };
+    open();
+    publish(0);
+    run_until(io, [&] { return end.done(); });
+    BOOST_TEST(cles::to_json(end.value) == R"({"node":"node","frames":60,"missing":0,"bad":0})");
+    BOOST_TEST_REQUIRE(all.size() == frames);
+    for (std::uint64_t i = 0; i < frames; ++i) {
+        BOOST_TEST(all[i].node == "node");
+        BOOST_TEST(all[i].frame == i);
+        BOOST_TEST(all[i].run_ms > 0);
+        BOOST_TEST(all[i].queue_ms >= 0);
+        BOOST_TEST(all[i].ready == (i + 1 >= fmv::background::learning));
+    }
+    BOOST_TEST(all.back().tracks.size() >= 2U);
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":0,"frames":60,"repeated":0,"refused":0,"bad":0})");
+}
+
+BOOST_FIXTURE_TEST_CASE(frames_that_are_missing_or_bad_are_counted, filming) {
+    publish(7); // before it is opened: of unknown age
+    open();
+    for (const std::uint64_t number : {10U, 11U, 15U}) {
+        publish(number);
+        run_ready(io);
+    }
+    publish(16, false);
+    run_ready(io);
+    publish(11); // comes late
+    run_ready(io);
+    publish(17);
+    until_results(4);
+    publish_end(18);
+    run_until(io, [&] { return end.done(); });
+    BOOST_TEST(cles::to_json(end.value) == R"({"node":"node","frames":4,"missing":3,"bad":1})");
+    BOOST_TEST(all.front().frame == 10U);
+    BOOST_TEST(all.back().frame == 17U);
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":0,"frames":4,"repeated":1,"refused":0,"bad":1})");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_video_ends_with_its_requester, filming) {
+    open();
+    publish(0);
+    until_results(1);
+    BOOST_TEST(ask("PULL self:FMV_Processing").starts_with(R"({"streams":1,)"));
+    stop.emit(boost::asio::cancellation_type::terminal);
+    run_until(io, [&] { return end.done(); });
+    run_ready(io);
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":0,"frames":1,"repeated":0,"refused":0,"bad":0})");
+}
+
+BOOST_FIXTURE_TEST_CASE(why_the_frames_do_not_come_is_the_answer, filming) {
+    open("self:nothing");
+    BOOST_TEST(end.code == cles::make_error_code(cles::errc::unavailable));
+    BOOST_TEST(end.words == "node: the frames of self:nothing: no_task: node has no BIND 'nothing'");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_video_is_a_stream_among_others, filming) {
+    open();
+    send(frame(0));
+    BOOST_TEST(send(frame(0, "b")) == "busy: node: the limit of streams is reached");
+    BOOST_TEST(
+        ask(R"(DELEGATE self:FMV_Processing {"frames":"self:video","width":320,"height":240,"format":"grey"})") ==
+        "busy: node: the limit of streams is reached");
+    stop.emit(boost::asio::cancellation_type::terminal);
+    run_until(io, [&] { return end.done(); });
+}
+
+BOOST_AUTO_TEST_CASE(a_video_that_cannot_be_is_refused) {
+    for (const auto* what :
+         {R"({"frames":"self:video","width":10,"height":240,"format":"grey"})",
+          R"({"frames":"self:video","width":320,"height":240,"format":"png"})", R"({"width":320,"height":240})"}) {
+        BOOST_TEST(ask(std::string{"DELEGATE self:FMV_Processing "} + what).starts_with("bad_request: node: "));
+    }
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":0,"frames":0,"repeated":0,"refused":0,"bad":3})");
+}
+
 BOOST_AUTO_TEST_CASE(settings_that_cannot_be) {
     for (const auto& wrong : {fmv::settings{.streams = 0}, fmv::settings{.streams = 65}, fmv::settings{.idle_s = 0}}) {
         boost::asio::io_context other;
@@ -200,6 +325,23 @@ BOOST_AUTO_TEST_CASE(a_stream_that_is_idle_is_forgotten) {
     BOOST_TEST((all.find("b", now + 20s) == nullptr));
     BOOST_TEST((all.begin("b", scene::size, now + 20s) != nullptr));
     BOOST_TEST(all.count() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(the_stream_of_a_job_is_forgotten_with_it) {
+    using namespace std::chrono_literals;
+    const auto now = std::chrono::steady_clock::time_point{} + 1h;
+    fmv::streams all{2, 10s};
+    auto job = all.open(scene::size, now);
+    BOOST_TEST((job != nullptr));
+    BOOST_TEST((all.begin("a", scene::size, now) != nullptr));
+    BOOST_TEST(all.count() == 2U);
+    BOOST_TEST((all.open(scene::size, now + 9s) == nullptr));
+    BOOST_TEST((all.begin("b", scene::size, now + 9s) == nullptr));
+    job.reset();
+    BOOST_TEST(all.count() == 1U);
+    job = all.open(scene::size, now + 9s);
+    BOOST_TEST((job != nullptr));
+    BOOST_TEST((all.open(scene::size, now + 20s) != nullptr)); // the other one has been idle
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -37,7 +37,7 @@ class Missing(unittest.TestCase):
                                                           "(--satellite): is clesd running there?")
         frames = recon.all("report")[0]["data"]["frames"]
         self.assertEqual((frames["captured"], frames["done"]), (20, 0))
-        self.assertEqual(frames["failed"] + frames["skipped"], 20)
+        self.assertEqual(frames["missing"] + frames["skipped"], 20)
 
     def test_a_satellite_without_the_plugin(self):
         satellite = self.fleet.satellite(plugins=[])
@@ -64,7 +64,8 @@ class Missing(unittest.TestCase):
         self.assertEqual(told["fate"], "refused")
         self.assertIn(words, told["trouble"])
         self.assertEqual(mission.all("report")[0]["data"],
-                         {"given": 1, "done": 0, "refused": 1, "failed": 0, "unknown": 0, "open": 0})
+                         {"given": 1, "done": 0, "hit": 0, "missed": 0, "unseen": 0, "refused": 1, "failed": 0, "aborted": 0,
+                          "unknown": 0, "open": 0})
 
     def test_no_strike_aircraft(self):
         self.check_refused([f"tcp://127.0.0.1:{free_port()}"], "no node answers at the given address (--strike)")
@@ -84,6 +85,9 @@ class Missing(unittest.TestCase):
         plugin = f"{{path: {self.fleet.plugin('strike')}, config: {{weapons: 5000}}}}"
         with self.assertRaisesRegex(Trouble, "weapons: 1000 at most"):
             self.fleet.striker(plugins=[plugin])
+        plugin = f"{{path: {self.fleet.plugin('strike')}, config: {{ledger: /nowhere/orders}}}}"
+        with self.assertRaisesRegex(Trouble, "cannot open the ledger"):
+            self.fleet.striker(plugins=[plugin])
         plugin = f"{{path: {self.fleet.plugin('fmv')}, config: {{streams: 0}}}}"
         with self.assertRaisesRegex(Trouble, "streams: 1 to 64"):
             self.fleet.satellite(plugins=[plugin])
@@ -97,19 +101,21 @@ class Missing(unittest.TestCase):
         self.assertIn("in use", err)
 
     def test_listening_to_everybody_takes_a_word(self):
-        code, _, err = run("recon", "--listen", "tcp://0.0.0.0:0")
-        self.assertEqual(code, 5)
-        self.assertIn("insecure", err)
+        for everybody, other in (("--listen", "--camera-listen"), ("--camera-listen", "--listen")):
+            code, _, err = run("recon", everybody, "tcp://0.0.0.0:0", other, "tcp://127.0.0.1:0")
+            self.assertEqual(code, 5)
+            self.assertIn("insecure", err)
 
     def test_wrong_usage(self):
         for arguments in ([], ["nonsense"], ["recon", "--fps", "0"], ["mission", "--strikes", "0"], ["recon", "--seed", "x"], ["recon", "--seed", "-1"], ["recon", "--frames", "-1"],
                           ["load", "--streams", "65"], ["mission", "--duration", "-1"], ["rehearse", "--scans", "31"],
-                          ["rehearse", "--delay", "2.1"], ["rehearse", "--strikes", "0"], ["rehearse", "--seed", "-1"]):
+                          ["compare", "--scenes", "0"], ["compare", "--seconds", "2.9"], ["rehearse", "--delay", "2.1"], ["rehearse", "--strikes", "0"], ["rehearse", "--seed", "-1"]):
             code, out, err = run(*arguments)
             self.assertEqual((code, out), (2, ""), arguments)
             self.assertNotEqual(err, "")
         for arguments in (["recon", "--satellite", "nonsense"], ["mission", "--recon", "nonsense"]):
-            code, _, err = run(*arguments, *(["--listen", "tcp://127.0.0.1:0"] if arguments[0] == "recon" else []))
+            at = ("--listen", "tcp://127.0.0.1:0", "--camera-listen", "tcp://127.0.0.1:0")
+            code, _, err = run(*arguments, *(at if arguments[0] == "recon" else ()))
             self.assertEqual(code, 5, arguments)
             self.assertIn("nonsense", err)
 
@@ -121,6 +127,15 @@ class Missing(unittest.TestCase):
                 self.assertEqual((record["strikes"], record["not_aimed"]), (3, 0))
                 self.assertGreater(record["expected_sigma"], 0)
                 self.assertLess(record["median_missed_by"], 20)
+
+    def test_comparing(self):
+        for seed in ("1", "18446744073709551615"):
+            code, out, err = run("compare", "--scenes", "2", "--seconds", "4", "--seed", seed)
+            self.assertEqual((code, err), (0, ""))
+            told = json.loads(out)
+            self.assertLessEqual(told["fused"], told["scenes"])
+            self.assertLessEqual(told["scenes"], 2)
+            self.assertLessEqual(told["with_plots"]["expected_sigma"], told["camera_alone"]["expected_sigma"])
 
     def test_an_impact_that_is_nowhere(self):
         recon = self.fleet.recon([self.fleet.satellite()])

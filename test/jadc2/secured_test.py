@@ -23,7 +23,10 @@ OBSERVER = {"observer": {"may": ["bind recon:tracks", *FINDS], "offers": []}}
 
 
 def order(name="o1"):
-    return json.dumps({"id": name, "lat": 33.2, "lon": -106.4, "ve": 1, "vn": 1, "sigma": 3, "sigma_v": 1, "utc": time.time()})
+    """Against a place north of all roads."""
+    now = time.time()
+    return json.dumps({"id": name, "lat": 33.21, "lon": -106.4, "ve": 1, "vn": 1, "sigma": 3, "sigma_v": 1, "utc": now,
+                       "until": now + 60})
 
 
 def run(*arguments):
@@ -57,7 +60,7 @@ class Story(StoryTest):
                               capture_output=True, text=True, timeout=120, check=False)
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertIn("strike1 offers strike at tls://", done.stdout)
-        self.assertIn("is done by strike1", done.stdout)
+        self.assertIn("is released by strike1", done.stdout)
 
 
 class Rights(unittest.TestCase):
@@ -78,8 +81,8 @@ class Rights(unittest.TestCase):
                 self.assertEqual((done.returncode, done.stdout, done.stderr), (5, "", f"cles: denied: {said}\n"))
         self.check_unused(striker)
         done = striker.ask("mission", "delegate", "strike1:strike", "-d", order("o2"), "-o", "json")
-        self.assertEqual((done.returncode, done.stderr), (0, ""))
-        self.assertEqual(json.loads(done.stdout)["left"], 3)
+        self.assertEqual((done.returncode, done.stdout), (6, ""))  # it may, but there is no target
+        self.assertIn("strike1: its own sensor sees no target there", done.stderr)
 
     def test_the_right_alone_is_not_enough(self):
         striker = self.fleet().striker()  # a member signs only for a node that it names
@@ -88,10 +91,60 @@ class Rights(unittest.TestCase):
                          (5, "", "cles: denied: strike1: 'strike' requires signed requests\n"))
         self.check_unused(striker)
 
+    def fleet_of_two_keys(self, *arguments, **more):
+        """A strike aircraft that needs a second key, and a mission centre."""
+        fleet = self.fleet({**RIGHTS, "second": {"may": ["pull,push *:strike", *FINDS], "offers": []}})
+        config = f"must_be_signed: true, must_be_confirmed: true, ledger: {fleet.folder}/orders"
+        striker = fleet.striker(plugins=[f"{{path: {fleet.plugin('strike')}, config: {{{config}}}}}"])
+        recon = fleet.recon([fleet.satellite()], "--fps", "30", "--deadline", "20000")
+        mission = fleet.mission(recon, [striker], "--deadline", "20000", "--duration", "60", *arguments, **more)
+        return fleet, striker, mission
+
+    def held(self, striker):
+        """The order that the aircraft holds; waits for it."""
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            if orders := striker.pull("strike1:strike").get("held"):
+                return orders[0]
+            time.sleep(0.05)
+        return self.fail("no order is held")
+
+    def test_a_second_member_confirms(self):
+        fleet, striker, mission = self.fleet_of_two_keys()
+        held = self.held(striker)
+        self.assertEqual(held["requester"], "mission")
+        word = json.dumps({"order": held["order"], "say": "confirm"})
+        done = striker.ask("mission", "push", "strike1:strike", "-d", word)
+        self.assertEqual((done.returncode, done.stdout), (5, ""))
+        self.assertIn("an order is confirmed by another member than the one that has given it", done.stderr)
+        done = striker.ask("second", "delegate", "strike1:strike", "-d", order())
+        self.assertEqual(done.returncode, 5)  # it confirms orders, and gives none
+        self.assertEqual(striker.pull("strike1:strike")["orders"], [])
+        done = striker.ask("second", "push", "strike1:strike", "-d", word)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn(mission.end(), (0, 7), mission.events)
+        with open(f"{fleet.folder}/orders", encoding="utf-8") as file:
+            (released,) = [json.loads(line) for line in file]
+        self.assertEqual((released["event"], released["requester"], released["confirmed_by"], released["what"]["id"]),
+                         ("released", "mission", "second", held["order"]))
+        self.assertEqual(released["what"]["picture"].split()[0], "sat1")
+
+    def test_an_order_is_withdrawn_until_it_is_released(self):
+        _, striker, mission = self.fleet_of_two_keys("--operator", stdin=subprocess.PIPE)
+        mission.order_by_hand()
+        held = self.held(striker)
+        mission.process.stdin.write("abort\n")
+        mission.process.stdin.flush()
+        self.assertEqual(mission.wait_for("strike", "is aborted: by the operator")["data"]["order"], held["order"])
+        self.assertEqual(mission.end(), 3, mission.events)
+        self.assertEqual(mission.all("report")[0]["data"]["aborted"], 1)
+        self.assertEqual(striker.pull("strike1:strike"), {"left": 4, "orders": []})
+
     def test_each_role_is_confined(self):
         fleet = self.fleet()
         satellite = fleet.satellite()
         recon = fleet.recon([satellite], "--fps", "1")
+        video = '{"frames":"mission:video","width":320,"height":240,"format":"grey"}'
         for member, words, said in (
                 ("mission", ("delegate", "sat1:FMV_Processing", "-d", "{}"),
                  "mission may not send DELEGATE 'FMV_Processing' to sat1"),
@@ -99,6 +152,10 @@ class Rights(unittest.TestCase):
                  "strike1 may not send DELEGATE 'FMV_Processing' to sat1"),
                 ("recon-camera", ("push", "sat1:FMV_Processing", "-d", "{}"),
                  "recon-camera may not send PUSH 'FMV_Processing' to sat1"),
+                ("recon-camera", ("delegate", "sat1:FMV_Frame", "-d", "{}"),
+                 "recon-camera may not send DELEGATE 'FMV_Frame' to sat1"),
+                ("recon-camera", ("delegate", "sat1:FMV_Processing", "-d", video),
+                 "sat1: frames: a noun of recon-camera"),  # the rights of sat1 are not for others to use
                 ("recon", ("pull", "sat1:cles"), "recon may not send PULL 'cles' to sat1")):
             done = satellite.ask(member, *words)
             self.assertEqual((done.returncode, done.stdout, done.stderr), (5, "", f"cles: denied: {said}\n"))
@@ -116,8 +173,7 @@ class Rights(unittest.TestCase):
         self.assertEqual(mission.end(), 3, mission.events)
         strike = mission.all("strike")[0]["data"]
         self.assertEqual((strike["fate"], strike["struck_by"]), ("refused", ""))
-        self.assertEqual(strike["trouble"], "observer: no known node offers DELEGATE 'strike': is libcles-strike.so among the "
-                                            "plugins of a node, and may observer request it?")
+        self.assertRegex(strike["trouble"], "observer may not send DELEGATE 'strike' to strike1|may observer request it")
         self.check_unused(striker)
 
     def test_an_aircraft_that_must_not_process_video(self):
@@ -127,6 +183,14 @@ class Rights(unittest.TestCase):
         self.assertRegex(recon.wait_for("trouble", "sat1")["text"], r"and may recon-camera request it\?$")
         recon.stop(signal.SIGINT)
         self.assertEqual(recon.end(), 3)
+
+    def test_a_satellite_that_must_not_get_the_video(self):
+        fleet = self.fleet({**RIGHTS, "sat1": {**RIGHTS["sat1"], "may": FINDS}})
+        recon = fleet.recon([fleet.satellite()])
+        self.assertIn("denied: sat1 may not bind 'video' of recon-camera",
+                      recon.wait_for("trouble", "the frames of recon-camera:video")["text"])
+        recon.stop(signal.SIGINT)
+        self.assertIn(recon.end(), (3, 5))  # 3: it was not found at first
 
     def test_outsiders_get_nothing(self):
         striker = self.fleet().striker()
@@ -152,7 +216,7 @@ class Rights(unittest.TestCase):
         fleet = self.fleet()
         satellite = fleet.satellite()
         code, out, err = run("load", "--at", satellite.url, "--streams", "1", "--duration", "0.5", "--keys",
-                             fleet.keys("recon-camera"))
+                             fleet.keys("loader"))
         self.assertEqual((code, err), (0, ""))
         self.assertGreater(json.loads(out.splitlines()[-1])["frames"], 0)
 

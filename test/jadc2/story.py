@@ -39,7 +39,7 @@ class StoryTest(unittest.TestCase):
         if report["to_be_found"]:
             self.assertGreater(report["recall"], 0)
         frames = report["frames"]
-        if frames["skipped"] * 5 > frames["captured"]:  # too many are missing to follow a vehicle
+        if (frames["skipped"] + frames["missing"]) * 5 > frames["captured"]:  # too many to follow a vehicle
             print(f"left out: {self.id()}: this machine is too busy to find targets")
             return
         if PATIENCE <= 30:  # a sanitizer leaves time for few frames, in which no vehicle may be in sight for long enough
@@ -54,7 +54,7 @@ class StoryTest(unittest.TestCase):
         # Frames must not fail on a busy machine. Under a sanitizer most would be skipped, and too few of them evaluated.
         recon = fleet.recon([satellite], "--fps", "30" if PATIENCE <= 30 else "6", "--deadline", "20000")
         mission = fleet.mission(recon, [striker], "--strikes", "3", "--duration", "60")
-        self.assertEqual(mission.end(), 0, mission.events)
+        self.assertIn(mission.end(), (0, 7), mission.events)  # one of 200 misses
         strikes = [self.check_strike(strike) for strike in mission.all("strike")]
         self.assertEqual(len(strikes), 3)
         self.assertEqual(len(mission.all("assessed")), 3)
@@ -65,20 +65,30 @@ class StoryTest(unittest.TestCase):
         self.assertGreaterEqual(len(hits), 2, mission.events)
 
         # The outcome of each job, at both of its ends.
-        self.assertEqual(mission.all("report")[0]["data"],
-                         {"given": 3, "done": 3, "refused": 0, "failed": 0, "unknown": 0, "open": 0})
+        report = mission.all("report")[0]["data"]
+        missed = sum(not one["data"]["hit"] for one in mission.all("assessed"))
+        self.assertEqual(report, {"given": 3, "done": 3, "hit": 3 - missed, "missed": missed, "unseen": 0, "refused": 0,
+                                  "failed": 0, "aborted": 0, "unknown": 0, "open": 0})
+        for strike in strikes:  # hits are told when they happen
+            seen = next(one for one in mission.all("assessed") if one["text"].startswith(f"order {strike['order']} "))
+            self.assertGreater(seen["utc"], strike["outcome"]["impact_utc"] - 0.1)
         self.assertEqual(striker.pull("strike1:strike")["orders"], sorted(told["order"] for told in strikes))
         recon.stop(signal.SIGINT)
         self.assertEqual(recon.end(), 0)
         report = recon.all("report")[0]["data"]
         frames = report["frames"]
-        self.assertEqual(frames["captured"], frames["done"] + frames["failed"] + frames["skipped"])
+        self.assertEqual(frames["captured"], frames["done"] + frames["missing"] + frames["skipped"])
         self.assertEqual(frames["nodes"], ["sat1"], frames)
         self.assertLessEqual(set(frames["failures"]), {"no_target"}, recon.events)  # before it was found
-        self.assertEqual(satellite.pull("sat1:FMV_Processing")["frames"], frames["done"])
+        processed = satellite.pull("sat1:FMV_Processing")
+        self.assertEqual((processed["repeated"], processed["bad"]), (0, 0))
+        self.assertGreaterEqual(processed["frames"], frames["done"])
+        self.assertLessEqual(processed["frames"], frames["done"] + frames["missing"])
         self.check_found(report)
+        if PATIENCE <= 30 and report["corrected"] == 0:  # the satellite's own plots are fused, unless nearly no target was seen
+            self.assertGreater((frames["skipped"] + frames["missing"]) * 5, frames["captured"], recon.events)
 
         # No node knows others than those of its links.
-        self.assertEqual(satellite.peers(), set())
+        self.assertLessEqual(satellite.peers(), {"recon-camera"})
         self.assertEqual(striker.peers(), set())
         return satellite, recon, striker

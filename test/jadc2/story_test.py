@@ -6,6 +6,7 @@ section 2.2, with an operator, and by the script.
     story_test.py PROGRAMS
 """
 
+import json
 import os
 import subprocess
 import sys
@@ -35,7 +36,8 @@ class Story(StoryTest):
         with Fleet(PROGRAMS) as fleet:
             satellite, striker = fleet.satellite(), fleet.striker()
             recon = fleet.recon([satellite], "--fps", "30")
-            mission = fleet.mission(recon, [striker], "--operator", stdin=subprocess.PIPE)
+            audit = os.path.join(fleet.folder, "audit")
+            mission = fleet.mission(recon, [striker], "--operator", "--audit", audit, stdin=subprocess.PIPE)
 
             def type_in(line):
                 mission.process.stdin.write(line + "\n")
@@ -47,9 +49,21 @@ class Story(StoryTest):
             mission.wait_for("operator", "'strike' is not an order")
             type_in("strike 999999")
             mission.wait_for("operator", "there is no target 999999 now")
+            for words in ("confirm", "hold", "abort"):
+                type_in(words)
+                mission.wait_for("operator", f"there is no order to {words}")
+            self.assertEqual(mission.all("decided"), [])  # nothing was read back
             decided = mission.order_by_hand()["data"]
-            self.assertEqual(mission.end(), 0, mission.events)
+            self.assertRegex(mission.all("read_back")[-1]["text"],
+                             r"^strike target \d+, at .* seen by sat1 in frame \d+, \d+\.\d s ago: confirm, hold or abort$")
+            self.assertIn(mission.end(), (0, 7), mission.events)  # one of 200 misses
             self.assertEqual(mission.all("strike")[0]["data"]["target"], decided["target"])
+            with open(audit, encoding="utf-8") as file:
+                kept = [json.loads(line) for line in file]
+            self.assertEqual(kept[0]["text"], "mission has no key; an operator decides")
+            self.assertEqual([one["event"] for one in kept if one["event"] in ("decided", "strike", "assessed", "report")],
+                             ["decided", "strike", "assessed", "report"])
+            self.assertIn(mission.all("decided")[0]["text"], [one["text"] for one in kept])
 
             mission = fleet.mission(recon, [striker], "--operator", stdin=subprocess.PIPE)
             mission.wait_for("bound")

@@ -7,6 +7,7 @@
 #include "strike/tasks.hpp"
 #include "support/answer.hpp"
 #include "support/asked_node.hpp"
+#include "support/temporary_folder.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/test/unit_test.hpp>
@@ -20,24 +21,41 @@
 namespace strike_tasks {
 namespace {
 
-const geo::geographic here{.lat = 48, .lon = 11}; // far from what its sensor sees
+const geo::geographic here{.lat = 48, .lon = 11};
 const geo::tangent_plane plane{here};
 
 double now() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 
 struct fixture : cles::test::asked_node {
-    fixture() {
-        strike::register_tasks(
-            node, {.weapons = 2, .lat = here.lat, .lon = here.lon, .height = 0, .speed = 100, .oldest_s = 60});
+    fixture() { strike::register_tasks(node, settings()); }
+
+    [[nodiscard]] strike::settings settings() const {
+        return {.weapons = 2,
+                .lat = here.lat,
+                .lon = here.lon,
+                .height = 0,
+                .speed = 100,
+                .oldest_s = 60,
+                .scans = 0,
+                .ledger = (folder / "orders").string()};
     }
     std::string give(const strike::order& what) { return ask("DELEGATE self:strike " + cles::to_json(what)); }
     static strike::order order(const std::string& id) {
         const auto at = plane.to_geographic({.east = 300, .north = 400});
-        return {.id = id, .lat = at.lat, .lon = at.lon, .sigma = 3, .sigma_v = 1, .utc = now()};
+        const double utc = now();
+        return {.id = id, .lat = at.lat, .lon = at.lon, .sigma = 3, .sigma_v = 1, .utc = utc, .until = utc + 60};
+    }
+    /// Against another target, which is elsewhere.
+    static strike::order other_order(const std::string& id) {
+        auto what = order(id);
+        what.lat -= 0.005;
+        return what;
     }
     static geo::plane_position aim(const strike::outcome& out) {
         return plane.to_plane({.lat = out.aim_lat, .lon = out.aim_lon});
     }
+
+    cles::test::temporary_folder folder{"cles-strike"};
 };
 
 } // namespace
@@ -81,7 +99,8 @@ BOOST_AUTO_TEST_CASE(what_its_own_sensor_sees_is_fused) {
     const auto target = *std::min_element(all.begin(), all.end(), [](const auto& a, const auto& b) {
         return std::hypot(a.at.east, a.at.north) < std::hypot(b.at.east, b.at.north); // so that it stays on its road
     });
-    const auto what = jadc2::test::order_for(target, utc);
+    auto what = jadc2::test::order_for(target, utc);
+    what.until = utc + 60;
     const auto out = cles::from_json<strike::outcome>(there.ask("DELEGATE self:strike " + cles::to_json(what)));
     BOOST_TEST(out.plots > 10U);
     BOOST_TEST(out.sigma < 2);
@@ -93,10 +112,58 @@ BOOST_AUTO_TEST_CASE(no_order_is_carried_out_twice) {
     BOOST_TEST(ask("PULL self:strike") == R"({"left":1,"orders":["o1"]})");
 }
 
+BOOST_AUTO_TEST_CASE(no_target_is_attacked_twice_without_a_word) {
+    give(order("o1"));
+    BOOST_TEST(give(order("o2")) ==
+               R"(failed: node: the target has been attacked by order o1: "again":true attacks it again)");
+    auto again = order("o3");
+    again.again = true;
+    BOOST_TEST(cles::from_json<strike::outcome>(give(again)).left == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(what_was_carried_out_before_a_restart_is_known) {
+    const auto at = (folder / "others").string();
+    auto aircraft = settings();
+    aircraft.ledger = at;
+    const auto first = cles::to_json(order("o1"));
+    {
+        cles::test::asked_node there;
+        strike::register_tasks(there.node, aircraft);
+        there.ask("DELEGATE self:strike " + first);
+    }
+    cles::test::asked_node there;
+    strike::register_tasks(there.node, aircraft);
+    BOOST_TEST(there.ask("DELEGATE self:strike " + first) == "failed: node: the order o1 has been carried out already");
+    BOOST_TEST(
+        there.ask("DELEGATE self:strike " + cles::to_json(order("o2"))).starts_with("failed: node: the target has"));
+    BOOST_TEST(there.ask("PULL self:strike") == R"({"left":1,"orders":["o1"]})");
+}
+
+BOOST_AUTO_TEST_CASE(without_a_ledger_a_track_from_before_the_start_is_not_struck) {
+    auto aircraft = settings();
+    aircraft.ledger.reset();
+    const auto before = cles::to_json(order("o1"));
+    cles::test::asked_node there;
+    strike::register_tasks(there.node, aircraft);
+    BOOST_TEST(there.ask("DELEGATE self:strike " + before) ==
+               "busy: node: the track is older than the start of this aircraft, which has no ledger");
+    BOOST_TEST(cles::from_json<strike::outcome>(there.ask("DELEGATE self:strike " + cles::to_json(order("o1")))).left ==
+               1U);
+}
+
+BOOST_AUTO_TEST_CASE(a_ledger_that_cannot_be_used) {
+    cles::test::asked_node there;
+    auto aircraft = settings();
+    aircraft.ledger = (folder / "missing/orders").string();
+    BOOST_CHECK_THROW(strike::register_tasks(there.node, aircraft), cles::error);
+}
+
 BOOST_AUTO_TEST_CASE(without_a_weapon_it_is_for_another) {
     give(order("o1"));
-    give(order("o2"));
-    BOOST_TEST(give(order("o3")) == "busy: node: no weapon is left");
+    give(other_order("o2"));
+    auto third = other_order("o3");
+    third.lat -= 0.005;
+    BOOST_TEST(give(third) == "busy: node: no weapon is left");
     BOOST_TEST(ask("PULL self:strike") == R"({"left":0,"orders":["o1","o2"]})");
 }
 
@@ -113,7 +180,7 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     BOOST_TEST(give(what) == "bad_request: node: id: 1 to 64 characters");
     what = order("o1");
     what.vn = std::numeric_limits<double>::infinity();
-    BOOST_TEST(give(what) == "bad_request: node: ve, vn and utc: numbers");
+    BOOST_TEST(give(what) == "bad_request: node: ve, vn, utc and until: numbers");
     what = order("o1");
     what.lat = 90;
     BOOST_TEST(give(what) == "bad_request: node: lat and lon: degrees, -89 to 89 and -180 to 180");
@@ -122,12 +189,12 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     BOOST_TEST(give(what) == "bad_request: node: sigma and sigma_v: more than 0, 1000 at most");
     what = order("o1");
     what.utc -= 100;
-    BOOST_TEST(give(what).starts_with("failed: node: the track is 100."));
+    BOOST_TEST(give(what).starts_with("busy: node: the track is 100."));
     what.utc += 200;
-    BOOST_TEST(give(what).starts_with("failed: node: the track is -"));
+    BOOST_TEST(give(what).starts_with("busy: node: the track is -"));
     what = order("o1");
     what.ve = 1000;
-    BOOST_TEST(give(what) == "failed: node: the target is too fast");
+    BOOST_TEST(give(what) == "busy: node: the target is too fast");
     BOOST_TEST(ask("PULL self:strike") == R"({"left":2,"orders":[]})");
 }
 
@@ -139,11 +206,32 @@ BOOST_AUTO_TEST_CASE(orders_that_must_be_signed) {
     BOOST_TEST(there.ask("PULL self:strike") == R"({"left":4,"orders":[]})");
 }
 
+BOOST_AUTO_TEST_CASE(orders_that_a_second_member_must_confirm) {
+    auto aircraft = settings();
+    aircraft.ledger.reset();
+    aircraft.must_be_confirmed = true;
+    cles::test::asked_node there; // without security, so that nobody can
+    strike::register_tasks(there.node, aircraft);
+    BOOST_TEST(there.ask("DELEGATE self:strike " + cles::to_json(order("o1")))
+                   .starts_with("denied: node: orders must be confirmed"));
+    BOOST_TEST(there.ask("PULL self:strike") == R"({"left":2,"orders":[]})");
+    auto drill = order("o2");
+    drill.drill = true;
+    BOOST_TEST(cles::from_json<strike::outcome>(there.ask("DELEGATE self:strike " + cles::to_json(drill))).left == 2U);
+}
+
+BOOST_AUTO_TEST_CASE(words_on_orders_that_are_not_held) {
+    BOOST_TEST(ask(R"(PUSH self:strike {"order":"o1","say":"confirm"})") == "failed: node: no order o1 is held");
+    BOOST_TEST(ask(R"(PUSH self:strike {"order":"o1","say":"abort"})") == "failed: node: no order o1 is held");
+    BOOST_TEST(ask(R"(PUSH self:strike {"order":"o1","say":"yes"})") == "bad_request: node: say: confirm or abort");
+}
+
 BOOST_AUTO_TEST_CASE(settings_that_cannot_be) {
     for (const auto& wrong :
          {strike::settings{.weapons = 1001}, strike::settings{.speed = 0}, strike::settings{.oldest_s = -1},
           strike::settings{.lat = std::numeric_limits<double>::quiet_NaN()}, strike::settings{.lon = 181},
-          strike::settings{.height = -1}, strike::settings{.scans = 31}}) {
+          strike::settings{.height = -1}, strike::settings{.scans = 31}, strike::settings{.range_m = 0},
+          strike::settings{.flight_s = -1}, strike::settings{.widest_m = std::numeric_limits<double>::infinity()}}) {
         boost::asio::io_context other;
         cles::service there{other, {.name = "there"}};
         BOOST_CHECK_THROW(strike::register_tasks(there, wrong), cles::error);
