@@ -19,7 +19,8 @@ from jadc2_fleet import PATIENCE, RIGHTS, DeferredSignals, Fleet, Trouble, clean
 
 def drive(programs):
     heading("A platoon: each vehicle has a key, states are sealed and signed (docs/platoon.md)")
-    words = ["cles-platoon", "run", "--secured", "--vehicles", "3", "--hz", "50", "--seconds", "2"]
+    words = ["cles-platoon", "run", "--secured", "--vehicles", "3", "--hz", "50", "--brake-at", "0.5", "--slow", "22", "--slow-for", "0.5",
+             "--seconds", "7"]
     print("  $ " + " ".join(words), flush=True)
     alone = {**clean_environment(), "CLES_MULTICAST": f"lo,239.255.25.37:{free_port()}"}
     with contextlib.ExitStack() as ends:

@@ -4,6 +4,7 @@
 
 #include "client/member_key.hpp"
 #include "options/keys_option.hpp"
+#include "output/end_of_output.hpp"
 #include "output/errors.hpp"
 #include "platoon/drive/drive.hpp"
 #include "platoon/drive/vehicle_node.hpp"
@@ -23,7 +24,7 @@ struct arguments {
     std::size_t vehicles = 0;
     double hz = 25, seconds = 0, loss_percent = 0, burst = 0, delay_ms = 0;
     std::vector<double> lags{}, brakes{};
-    double brake_at = platoon::manoeuvre{}.brake_at;
+    platoon::manoeuvre plan{};
     double lag = platoon::vehicle_limits{}.lag, brake = platoon::vehicle_limits{}.brake;
     std::uint64_t seed = 1, first_seed = 1;
     unsigned seeds = 1;
@@ -42,7 +43,7 @@ struct arguments {
     [[nodiscard]] platoon::driver_setup setup() const {
         return {.hz = hz,
                 .uses_leader = controller == "leader",
-                .plan = {.brake_at = brake_at},
+                .plan = plan,
                 .radar = {.fitted = !no_radar},
                 .law = platoon::gains_for(hz)};
     }
@@ -168,7 +169,7 @@ int run(const arguments& args) {
     if (!args.record.empty()) {
         write(drive, args.record);
     }
-    return drive.verdict.collision ? 1 : 0;
+    return exit_code_of(drive.verdict, drive.steady);
 }
 
 int vehicle(const arguments& args) {
@@ -220,9 +221,13 @@ void add_common(CLI::App& command, arguments& args) {
     command.add_flag("--no-radar", args.no_radar, "Vehicles have no radar: without updates they see nothing");
     command.add_option("--delay", args.delay_ms, "Delay of updates in ms: at least half of it, at most all of it (0)")
         ->check(CLI::Range(0.0, 1000.0));
-    command.add_option("--brake-at", args.brake_at, "The leader brakes at T (5)")
+    command.add_option("--brake-at", args.plan.brake_at, "The leader brakes at T (5)")
         ->check(CLI::Range(0.0, 3600.0))
         ->type_name("T");
+    command.add_option("--slow", args.plan.slow, "It brakes from 25 m/s to this speed in m/s (10)")
+        ->check(CLI::Range(1.0, 24.0));
+    command.add_option("--slow-for", args.plan.slow_for, "It drives slowly for this many seconds (5)")
+        ->check(CLI::Range(0.0, 600.0));
     command.add_option("--controller", args.controller, "Follow the leader too, or only the predecessor")
         ->check(CLI::IsMember({"leader", "predecessor"}));
 }
@@ -244,6 +249,10 @@ void add_seeds(CLI::App& command, arguments& args) {
     command.add_option("-n,--vehicles", args.vehicles, "Number of vehicles (20)")->check(CLI::Range(2, 100));
     command.add_option("--seeds", args.seeds, "Number of drives, each with its own losses (1)")
         ->check(CLI::Range(1, 100'000));
+    command
+        .add_option("--sine", args.plan.period,
+                    "The leader's acceleration is a sine of 1 m/s² with this period in seconds, and it does not brake")
+        ->check(CLI::Range(1.0, 60.0));
     command.add_option("--mute", args.mutes, "Vehicle I sends nothing from T on, for D seconds")->type_name("I@T[+D]");
     command.add_option("--first-seed", args.first_seed, "Seed of the first of them (1)");
 }
@@ -269,10 +278,13 @@ int dispatch(const CLI::App& app, const arguments& args) {
 } // namespace
 
 int main(int argc, char** argv) {
+    tool::check_output_at_exit("cles-platoon", 5);
     arguments args;
     CLI::App app{"A platoon of vehicles that communicate by multicast.", "cles-platoon"};
     app.require_subcommand(1);
-    app.footer("Exit codes: 0 ok, 1 a collision, 2 usage, 3 no vehicle or no multicast, 5 another error, 6 busy.");
+    app.footer(
+        "Exit codes: 0 ok, 1 a collision, or a platoon that stood still or fell apart, 2 usage, 3 no vehicle or no "
+        "multicast, 4 the manoeuvre did not end, 5 another error, 6 busy.");
     auto& in_time = *app.add_subcommand("simulate", "Simulate a drive in virtual time, without a network");
     auto& search = *app.add_subcommand("tune", "Search the gains of the controller, in virtual time");
     auto& on_road = *app.add_subcommand("run", "Run a drive, with a process for each vehicle");

@@ -34,7 +34,7 @@ BURST = 3  # updates, on average
 
 def asked(program, *arguments):
     done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False)
-    if done.returncode not in (0, 1):  # 1: a collision, which the result contains
+    if done.returncode not in (0, 1, 4):  # 1: a collision; 4: the manoeuvre did not end: the result contains both
         raise SystemExit(f"platoon.py: {' '.join(map(str, arguments))}: {done.stderr.strip()}")
     return json.loads(done.stdout)
 

@@ -30,7 +30,7 @@ BURSTS = (1.2, 2, 3, 5, 8)
 
 def asked(program, *arguments):
     done = subprocess.run([program, "simulate", *map(str, arguments)], capture_output=True, text=True, check=False)
-    if done.returncode not in (0, 1):  # 1: a collision
+    if done.returncode not in (0, 1, 4):  # 1: a collision; 4: the manoeuvre did not end
         raise SystemExit(f"platoon_pictures.py: {' '.join(map(str, arguments))}: {done.stderr.strip()}")
     return done.stdout
 

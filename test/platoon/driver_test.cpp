@@ -156,7 +156,7 @@ BOOST_AUTO_TEST_CASE(with_a_radar_it_falls_back_to_a_time_gap_instead) {
     BOOST_TEST((all.v2.mode() == role::radar));
     BOOST_TEST(std::abs(all.v2.command()) < 0.1); // a short interruption changes almost nothing
     BOOST_TEST(all.v2.report().lead == "v0");
-    all.drive(3);
+    all.drive(1.5);
     BOOST_TEST(all.v2.report().lead == "v2"); // those behind have to make room with it
     all.drive(40);
     BOOST_TEST(std::abs(all.v2.position().v - 25) < 0.1);
@@ -165,6 +165,52 @@ BOOST_AUTO_TEST_CASE(with_a_radar_it_falls_back_to_a_time_gap_instead) {
     all.silent.clear();
     all.drive(60);
     BOOST_TEST((all.v2.mode() == role::follow));
+    BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.position().x - 15) < 0.05);
+}
+
+// v0 says that it drives on at 25 m/s, and stops.
+BOOST_AUTO_TEST_CASE(it_brakes_by_its_radar_whatever_updates_say) {
+    platoon::driver v1{{.name = "v1", .ahead = "v0", .start = {.x = -15, .v = 25, .a = 0}}, 0};
+    platoon::motion truth{.x = 0, .v = 25, .a = 0};
+    double least = 15;
+    for (int i = 0; i < 600; ++i) {
+        const double now = i * 0.01;
+        if (i % 4 == 0) {
+            v1.receive("v0", {.mode = role::lead, .lead = "v0", .t = now, .x = 25 * now, .v = 25}, now);
+        }
+        if (i % 8 == 0) {
+            const auto self = advance(v1.position(), v1.command(), 0.3, now - v1.now());
+            v1.measure({.range = truth.x - 5 - self.x, .rate = truth.v - self.v}, now);
+        }
+        v1.step(now);
+        least = std::min(least, truth.x - v1.position().x);
+        truth = advance(truth, -6, 0.3, 0.01);
+    }
+    BOOST_TEST(v1.position().v < 0.1);
+    BOOST_TEST(least > 10);
+}
+
+BOOST_AUTO_TEST_CASE(updates_that_arrive_do_not_close_the_gap_of_a_poor_link) {
+    road all;
+    all.radar = true;
+    all.drive(3);
+    int changes = 0;
+    all.v2.on_change = [&](double, role, const std::string&) { ++changes; };
+    for (int i = 0; i < 10; ++i) {
+        all.silent = {"v1"};
+        all.drive(1.4);
+        all.silent.clear();
+        all.drive(5 * period);
+        BOOST_TEST((all.v2.mode() == role::radar), i);
+        BOOST_TEST(all.v2.report().lead == "v2", i);
+    }
+    BOOST_TEST(changes == 1);
+    BOOST_TEST(all.v2.desired_distance() > 18);
+    BOOST_TEST(all.v1.x - period * 25 - all.v2.position().x > 18);
+    all.drive(60);
+    BOOST_TEST((all.v2.mode() == role::follow));
+    BOOST_TEST(changes == 2);
+    BOOST_TEST(all.v2.report().lead == "v0");
     BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.position().x - 15) < 0.05);
 }
 

@@ -42,6 +42,28 @@ BOOST_AUTO_TEST_CASE(claims_nothing_of_a_drive_that_nobody_saw) {
     BOOST_TEST(cles::to_json(judge.result()).find(R"("least_gap":null)") != std::string::npos);
 }
 
+BOOST_AUTO_TEST_CASE(a_drive_has_a_verdict_only_if_the_manoeuvre_ended) {
+    platoon::verdict found{.string_ratio = 3};
+    BOOST_TEST(exit_code_of(found, true) == 4);
+    BOOST_TEST(exit_code_of(found, false) == 0); // it was about something else
+    BOOST_TEST(!is_failure(found, true));
+    found.ended = true;
+    BOOST_TEST(exit_code_of(found, true) == 0);
+    BOOST_TEST(is_failure(found, true));
+    found.collision = true;
+    BOOST_TEST(exit_code_of(found, true) == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_platoon_that_stands_or_is_apart_has_failed_unless_that_was_planned) {
+    for (const bool stands : {false, true}) {
+        const platoon::verdict found{.ended = true, .stands = stands, .apart = !stands};
+        BOOST_TEST(exit_code_of(found, true) == 1);
+        BOOST_TEST(is_failure(found, true));
+        BOOST_TEST(exit_code_of(found, false) == 0);
+        BOOST_TEST(!is_failure(found, false));
+    }
+}
+
 BOOST_AUTO_TEST_CASE(one_alone_has_no_gap) {
     BOOST_TEST(std::isnan(platoon::least_gap({{.x = 3}}, 5)));
     BOOST_TEST(platoon::least_gap({{.x = 3}, {.x = 23}}, 5) == 15);

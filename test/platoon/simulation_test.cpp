@@ -15,6 +15,7 @@ namespace {
 constexpr unsigned some_seeds = cles::test::amount(5U, 1U);
 constexpr unsigned many_seeds = cles::test::amount(40U, 4U);
 const std::vector<double> times = cles::test::amount(std::vector{2.0, 5.5, 7.0, 12.0}, std::vector{5.5});
+const std::vector<double> cells_of_loss = cles::test::amount(std::vector{0.2, 0.5, 0.8, 1.0}, std::vector{0.5});
 const std::vector<double> rates = cles::test::amount(std::vector{10.0, 50.0}, std::vector{10.0});
 
 double worst_ratio(platoon::scenario what, unsigned seeds) {
@@ -88,6 +89,32 @@ BOOST_AUTO_TEST_CASE(errors_do_not_grow_along_the_platoon) {
     BOOST_TEST(worst_ratio(with(25, 0.1), some_seeds) <= 1.02);
     BOOST_TEST(worst_ratio(with(10, 0), 1) <= 1.02);
     BOOST_TEST(worst_ratio(with(10, 0.1), some_seeds) <= 1.02);
+}
+
+BOOST_AUTO_TEST_CASE(at_a_single_frequency_errors_do_not_grow_but_accelerations_do) {
+    auto what = with(25, 0);
+    what.vehicles = 6;
+    what.setup.plan.period = 5.4; // at which accelerations grow most
+    const auto found = simulate(what);
+    BOOST_TEST(found.ended);
+    BOOST_TEST_REQUIRE(found.sine.error.size() == 4U);
+    BOOST_TEST(platoon::largest(found.sine.error) <= 1);
+    BOOST_TEST_REQUIRE(found.sine.acceleration.size() == 5U);
+    BOOST_TEST(found.sine.acceleration[0] > 1.1);
+}
+
+BOOST_AUTO_TEST_CASE(a_platoon_that_stands_has_not_kept_together) {
+    auto what = with(25, 1);
+    what.vehicles = 4;
+    what.setup.radar.fitted = false;
+    const auto found = simulate(what);
+    BOOST_TEST(found.ended);
+    BOOST_TEST(found.stands);
+    BOOST_TEST(found.apart);
+    what.setup.radar.fitted = true;
+    const auto with_radar = simulate(what);
+    BOOST_TEST(!with_radar.stands);
+    BOOST_TEST(!with_radar.apart);
 }
 
 BOOST_AUTO_TEST_CASE(without_the_leader_they_grow) {
@@ -212,6 +239,26 @@ BOOST_AUTO_TEST_CASE(bursts_rarely_make_errors_grow) {
         failures += result.string_ratio > platoon::stable_ratio ? 1 : 0;
     }
     BOOST_TEST(failures <= 4); // 11, if others do not tell what one does whose updates are missing
+}
+
+// As many drives as a test can afford; perf/evaluation/platoon_cells.py drives more.
+BOOST_AUTO_TEST_CASE(however_many_updates_are_lost_nobody_collides) {
+    const platoon::spread equal{};
+    const platoon::spread mixed{.least_lag = 0.2, .most_lag = 0.5, .least_brake = 5.5, .most_brake = 8};
+    for (const double loss : cells_of_loss) {
+        for (const double burst : {0.0, 10.0, 30.0}) {
+            for (const auto& differences : {equal, mixed}) {
+                auto what = with(10, 0);
+                what.losses = platoon::losses_of(loss, loss < 1 ? burst : 0);
+                what.differences = differences;
+                what.seconds = 16; // until all have braked
+                for (what.seed = 170; what.seed < 170 + some_seeds; ++what.seed) {
+                    const auto result = simulate(what);
+                    BOOST_TEST(result.least_gap > 0, loss << " lost, bursts of " << burst << ", seed " << what.seed);
+                }
+            }
+        }
+    }
 }
 
 BOOST_AUTO_TEST_CASE(unless_brakes_are_too_weak_no_error_is_larger_than_the_first) {

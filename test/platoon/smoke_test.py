@@ -64,7 +64,7 @@ class Drives(DriveTest):
         wait_until(lambda: children_of(watcher.pid), "it starts vehicles")
         os.killpg(watcher.pid, signal.SIGINT)
         out, err = watcher.communicate(timeout=PATIENCE)
-        self.assertEqual((watcher.returncode, err), (0, ""))
+        self.assertEqual((watcher.returncode, err), (4, ""))
         self.assertRegex(out, r"(?m)^gap +(unknown: the drive ended before all vehicles had started|\d+\.\d{3} m at least)$")
 
     def test_a_drive_on_a_network(self):
@@ -113,6 +113,12 @@ class Alone(unittest.TestCase):
         self.assertIn("it changes into the lane behind v1", told, found["events"])
         self.assertIn("it splits off", told)
         self.assertRegex(out, r"^seed 1 .*\nseed 2 .*\nall ")
+        code, out, err = run("simulate", "--vehicles", 3, "--hz", 10, "--sine", 1)
+        self.assertEqual((code, err), (0, ""))
+        self.assertRegex(out, r"(?m)^sine +.*accelerations \d\.\d{4} times those of the one ahead, at most$")
+        code, out, err = run("simulate", "--vehicles", 2, "--seconds", 1, "--seeds", 2)
+        self.assertEqual((code, err), (4, ""))
+        self.assertRegex(out, r"(?m)^ended     no: ")
         code, out, err = run("tune", "--vehicles", 2, "--hz", 10, "--brake-at", 0.5, "--seconds", 2.5)
         self.assertEqual((code, err), (0, ""))
         costs = [float(line.rpartition(" ")[2]) for line in out.splitlines()]

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSL-1.0
 """What `cles-platoon` says if something is missing or wrong, and how it shows a drive."""
 
+import json
 import os
 import pty
 import re
@@ -68,6 +69,42 @@ class Usage(unittest.TestCase):
             self.assertEqual((code, out), (2, ""), arguments)
             self.assertNotEqual(err, "", arguments)
 
+    def test_a_drive_that_ends_before_the_manoeuvre_has_no_verdict(self):
+        for seeds in (1, 2):
+            code, out, err = run("simulate", "--seconds", 3, "--loss", 10, "--seeds", seeds)
+            self.assertEqual((code, err), (4, ""))
+            self.assertRegex(out, r"(?m)^ended     no: ")
+            self.assertNotIn("failures", out)
+
+    def test_a_platoon_that_stands_or_falls_apart_has_failed(self):
+        code, out, err = run("simulate", "--loss", 100, "--no-radar", "--seeds", 2, "--vehicles", 4)
+        self.assertEqual((code, err), (1, ""))
+        self.assertIn("failures  2 of 2 drives above a string ratio of 1.02, or with vehicles that stand or are apart: ", out)
+        code, out, err = run("simulate", "--loss", 100, "--no-radar", "--vehicles", 4)
+        self.assertEqual((code, err), (1, ""))
+        self.assertRegex(out, r"(?m)^stands    A VEHICLE STANDS")
+        self.assertRegex(out, r"(?m)^apart     THE PLATOON FELL APART")
+
+    def test_errors_that_are_only_noise_are_no_failures(self):
+        code, out, err = run("simulate", "--vehicles", 100, "--loss", 10)
+        self.assertEqual((code, err), (0, ""))
+        self.assertLess(float(re.search(r"string ratio (\S+)", out)[1]), 1.02)
+
+    def test_it_tells_the_gains_in_time_and_frequency(self):
+        code, out, err = run("simulate", "--vehicles", 4, "--json")
+        self.assertEqual((code, err), (0, ""))
+        found = json.loads(out)
+        for half in ("braking", "recovery"):
+            self.assertEqual([len(found[half][what]) for what in ("error", "speed", "acceleration")], [2, 3, 3], half)
+            self.assertGreater(found[half]["speed"][0], 0.9, half)
+        code, out, err = run("simulate", "--vehicles", 4, "--sine", 6, "--json")
+        self.assertEqual((code, err), (0, ""))
+        sine = json.loads(out)["sine"]
+        self.assertEqual(len(sine["acceleration"]), 3)
+        # In a periodic motion, speed and acceleration differ by the same factor in all vehicles.
+        for speed, acceleration in zip(sine["speed"], sine["acceleration"]):
+            self.assertAlmostEqual(speed, acceleration, delta=0.02)
+
     def test_the_search_of_gains_ends_with_the_best(self):
         code, out, err = run("tune", "--vehicles", 3, "--hz", 10, "--loss", 10, "--seeds", 1, "--seconds", 12)
         self.assertEqual((code, err), (0, ""))
@@ -103,7 +140,7 @@ class Usage(unittest.TestCase):
             shown += part
         os.close(controller)
         watcher.communicate(timeout=PATIENCE)
-        self.assertEqual(watcher.returncode, 0)
+        self.assertEqual(watcher.returncode, 4)  # the leader has not braked yet
         self.assertRegex(shown.decode(), r"\x1b\[H\x1b\[J +\d+\.\d s +m/s +m/s2  distance   error\r\nv0 +2\d\.\d\d .* lead")
         self.assertRegex(shown.decode(), r"\nv1 +2\d\.\d\d .* 1\d\.\d\d .* follow")
 

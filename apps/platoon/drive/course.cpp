@@ -66,6 +66,9 @@ recording course_of(const logbook& book, const std::vector<std::string>& first, 
                 those_first.push_back(*at);
             }
         }
+        if (t >= how.setup.plan.recovery()) {
+            spacing_assessment.begin_recovery();
+        }
         if (those_first.size() == first.size()) {
             spacing_assessment.sample(those_first, desired);
         }
@@ -85,6 +88,7 @@ recording course_of(const logbook& book, const std::vector<std::string>& first, 
     out.verdict = spacing_assessment.result();
     out.verdict.least_gap = least;
     out.verdict.collision = least <= 0;
+    out.verdict.ended = end >= how.setup.plan.end();
     return out;
 }
 

@@ -221,6 +221,8 @@ class drive_supervisor {
         add("--brake", limits_[i].brake);
         add("--hz", setup.hz);
         add("--brake-at", setup.plan.brake_at);
+        add("--slow", setup.plan.slow);
+        add("--slow-for", setup.plan.slow_for);
         add("--loss", options_.loss * 100);
         add("--burst", options_.burst);
         add("--delay", options_.delay * 1000);

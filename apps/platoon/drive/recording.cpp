@@ -11,6 +11,7 @@
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 namespace platoon {
 namespace {
@@ -55,6 +56,33 @@ latency_summary summarise(std::vector<double> latencies_us) {
     return out;
 }
 
+bool is_failure(const verdict& result, bool steady) {
+    const bool judged = result.ended || !steady;
+    return (judged && result.string_ratio > stable_ratio) || (steady && (result.stands || result.apart));
+}
+
+int exit_code_of(const verdict& result, bool steady) {
+    if (result.collision || (steady && (result.stands || result.apart))) {
+        return 1;
+    }
+    return steady && !result.ended ? 4 : 0;
+}
+
+std::string gains_line(const char* heading, const amplification& gains_of_each) {
+    std::string text;
+    for (const auto& [what, each] :
+         {std::pair{"errors", &gains_of_each.error}, std::pair{"speeds", &gains_of_each.speed},
+          std::pair{"accelerations", &gains_of_each.acceleration}}) {
+        const double most = largest(*each);
+        if (!std::isnan(most)) {
+            std::array<char, 64> part{};
+            std::snprintf(part.data(), part.size(), "%s %s %.4f", text.empty() ? "" : ",", what, most);
+            text += part.data();
+        }
+    }
+    return text.empty() ? "" : std::string{heading} + text + " times those of the one ahead, at most\n";
+}
+
 std::string summary_of(const recording& drive) {
     const auto& v = drive.verdict;
     std::string text;
@@ -80,6 +108,18 @@ std::string summary_of(const recording& drive) {
                               "hardest   accelerations of up to %.4f times those of the leader\n",
                               v.acceleration_ratio));
         }
+        text += gains_line("braking  ", v.braking);
+        text += gains_line("recovery ", v.recovery);
+        text += gains_line("sine     ", v.sine);
+    }
+    if (drive.steady && !v.ended) {
+        text += "ended     no: the drive was over before the manoeuvre, so it does not show string stability\n";
+    }
+    if (drive.steady && v.stands) {
+        text += "stands    A VEHICLE STANDS at the end\n";
+    }
+    if (drive.steady && v.apart) {
+        text += "apart     THE PLATOON FELL APART: a vehicle is more than 50 m behind its place at the end\n";
     }
     if (std::isnan(v.least_gap)) {
         text += "gap       unknown: the drive ended before all vehicles had started\n";

@@ -78,6 +78,13 @@ BOOST_DESCRIBE_STRUCT(recording, (),
                       (source, vehicles, hz, loss, burst, delay_ms, spacing, seed, steady, verdict, fallbacks,
                        radar_spells, sent, received, lost, missed, latency, events, t, courses))
 
+/// Whether string stability was lost: errors grew, or, while the platoon stayed the same, vehicles stand or are apart.
+bool is_failure(const verdict& result, bool steady);
+/// The exit code of a drive: 1 for a collision, and if vehicles stand or are apart although nothing was planned to
+/// happen to them; 4 if the manoeuvre did not end, so that there is no verdict; otherwise 0.
+int exit_code_of(const verdict& result, bool steady);
+/// What gains there are, in one line; empty: there are none.
+std::string gains_line(const char* heading, const amplification& gains_of_each);
 /// A few lines of text.
 std::string summary_of(const recording& drive);
 /// Checks that a file can be opened for writing; it is created if it does not exist, and not changed otherwise.

@@ -2,6 +2,7 @@
 #include "platoon/drive/vehicle_node.hpp"
 
 #include "client/member_key.hpp"
+#include "output/log_line.hpp"
 #include "platoon/simulation/simulation.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -13,6 +14,7 @@
 #include <array>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 
@@ -121,7 +123,8 @@ double utc_at(std::int64_t monotonic) {
 
 vehicle_node::vehicle_node(vehicle_options options)
     : options_(std::move(options)), service_(io_, options_of(options_)), signals_(io_, SIGTERM, SIGINT),
-      sensor_(options_.setup.radar, seed_for("radar", options_.seed)) {
+      sensor_(options_.setup.radar, seed_for("radar", options_.seed)),
+      log_(tool::stream::err, [](std::uint64_t count) { return tool::dropped_text(count) + "\n"; }) {
     report_.vehicle = options_.setup.name;
     service_.on_bind("state", {.description = "Its mode, position, speed and acceleration",
                                .must_be_signed = !options_.keys.empty()});
@@ -195,7 +198,9 @@ void vehicle_node::begin(const driver_setup& setup) {
 }
 
 void vehicle_node::note(double at, const std::string& mode, const std::string& why) {
-    std::fprintf(stderr, "%8.3f s  %s  %s: %s\n", at, report_.vehicle.c_str(), mode.c_str(), why.c_str());
+    std::array<char, 32> time{};
+    std::snprintf(time.data(), time.size(), "%8.3f s  ", at);
+    log_.write(time.data() + report_.vehicle + "  " + mode + ": " + why + "\n");
     report_.events.push_back({at, report_.vehicle, mode, why});
 }
 

@@ -3,6 +3,7 @@
 
 #include <cles/service.hpp>
 
+#include "output/log_writer.hpp"
 #include "platoon/drive/recording.hpp"
 #include "platoon/driver/driver.hpp"
 #include "platoon/driver/localization.hpp"
@@ -92,6 +93,7 @@ class vehicle_node {
     double followed_at_ = 0;
     std::optional<double> left_at_; ///< when it will have left
     std::exception_ptr failure_;
+    tool::log_writer log_; ///< it drives on, whatever the reader of its log does
     vehicle_report report_;
 };
 

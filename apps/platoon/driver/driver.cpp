@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "platoon/driver/driver.hpp"
 
+#include "platoon/driver/emergency.hpp"
+
 #include <algorithm>
 #include <cmath>
 
@@ -26,14 +28,14 @@ constexpr double refuting_error = 0.3; // m, from what the radar sees
 constexpr double refuting_speed = 0.5; // m/s
 
 // With the radar alone.
+constexpr double slower_by = 0.5;        // m/s, than updates say: from there on, the radar is right
 constexpr double radar_share_time = 0.8; // s, in which its estimate replaces the extrapolated update
-constexpr double hold_time = 3;          // s, after which the gap opens, and this vehicle leads those behind
 constexpr double full_time_gap = 1.5;    // s
 constexpr double standstill_gap = 5;     // m
-constexpr double open_speed = 3;         // m/s, at which the gap opens
+constexpr double open_speed = 2;         // m/s, at which the gap opens
 constexpr double least_time_gap = 0.5;   // s, in the gain: a smaller one would react to noise, faster than the vehicle
 constexpr double radar_gain = 0.4;       // 1/s
-constexpr double switch_time = 2;        // s, from the law for constant spacing to the one for a time gap
+constexpr double switch_time = 1;        // s, from the law for constant spacing to the one for a time gap
 constexpr double trust_after = 2; // s without a gap in the updates, after which the distance becomes smaller again
 
 // A merge.
@@ -55,7 +57,7 @@ reference blend(const reference& from, const reference& to, double share) {
 
 driver::driver(driver_setup setup, double now)
     : setup_(std::move(setup)), self_(setup_.start), now_(now), began_(std::max(now, 0.0)), ahead_(setup_.ahead),
-      distance_(setup_.spacing), radar_(setup_.radar) {
+      distance_(setup_.spacing), link_(began_), radar_(setup_.radar) {
     if (ahead_.empty()) {
         mode_ = role::lead;
         lead_ = setup_.name;
@@ -130,9 +132,9 @@ void driver::receive(const std::string& from, const state& heard_now, double now
     if (!needs(from) || drops(from, heard_now, now)) {
         return;
     }
-    bool anew = !tracks_.contains(from) || lead_ == setup_.name;
+    bool anew = !tracks_.contains(from) || (lead_ == setup_.name && !opens_since_);
     auto& who = tracks_[from];
-    who.receive(heard_now, now);
+    const bool is_newer = who.receive(heard_now, now);
     const bool in_lane = who.last().mode != role::merge;
     if (from == admits_ && in_lane && who.last().ahead == setup_.name) {
         admits_until_ = std::min(admits_until_, now + in_lane_notice);
@@ -141,24 +143,34 @@ void driver::receive(const std::string& from, const state& heard_now, double now
         ahead_ = from;
         next_.clear();
         makes_room_for_.clear();
+        link_ = link_quality{now};
         anew = true;
     }
     if (from != ahead_) {
         return;
     }
+    if (is_newer) { // others, such as those that somebody repeats, say nothing about the link now
+        link_.receive(now);
+    }
     if (anew) {
-        const double measured = who.at(now).x - advance(self_, applied_, setup_.limits.lag, now - now_).x;
-        distance_ = std::abs(measured - wanted()) < distance_tolerance ? wanted() : measured;
+        measure_distance(who, now);
     }
     refuted_ = false;
     beyond_ = who.last().lead == ahead_ ? "" : who.last().ahead;
     makes_room_for_ = mode_ == role::merge || who.last().admits == setup_.name ? "" : who.last().admits;
-    choose_leader(who.last());
+    if (!opens_since_) { // else it leads, until it rejoins
+        choose_leader(who.last());
+    }
     const auto* beyond = heard(beyond_);
     to_beyond_ = beyond == nullptr ? std::nullopt : std::optional{who.last().behind - beyond->last().behind};
     if (who.last().mode == role::leave) {
         take_over(who.last());
     }
+}
+
+void driver::measure_distance(const track& ahead, double now) {
+    const double measured = ahead.at(now).x - advance(self_, applied_, setup_.limits.lag, now - now_).x;
+    distance_ = std::abs(measured - wanted()) < distance_tolerance ? wanted() : measured;
 }
 
 bool driver::drops(const std::string& from, const state& told, double now) {
@@ -197,11 +209,12 @@ void driver::step(double now) {
     if (!admits_.empty() && now_ > admits_until_) {
         admits_.clear();
     }
+    link_.step(now_);
     infer_ahead();
     from_leader_.reset();
     if (mode_ == role::lead) {
         lead(dt);
-    } else if (!silent(ahead_)) {
+    } else if (!silent(ahead_) && !keeps_off()) {
         if (heard(ahead_) != nullptr) {
             follow(dt);
         }
@@ -212,6 +225,7 @@ void driver::step(double now) {
     } else {
         fall_back(dt);
     }
+    brake_in_emergency();
     command_ = std::clamp(command_, -setup_.limits.brake, setup_.limits.accelerate);
     applied_ =
         std::clamp(compensated(command_, self_.a, setup_.limits.lag), -setup_.limits.brake, setup_.limits.accelerate);
@@ -220,11 +234,39 @@ void driver::step(double now) {
     }
 }
 
+// Although updates arrive.
+bool driver::keeps_off() const {
+    return mode_ != role::merge && link_.is_poor() && heard(ahead_) != nullptr && radar_.sees(now_);
+}
+
+// If it sees the one ahead slower than its updates say, or what was derived from them, then those are wrong.
+void driver::heed_radar(const reference& ahead) {
+    if (mode_ == role::merge || !radar_.sees(now_)) {
+        return;
+    }
+    auto seen = radar_.at(now_);
+    if (seen.v < ahead.where.v - slower_by) {
+        seen.x += setup_.limits.length;
+        const reference truth{.where = seen, .command = seen.a, .distance = distance_};
+        command_ = std::min(command_, spacing_law(setup_.law, self_, truth, 0, 0));
+    }
+}
+
+// Whatever updates say.
+void driver::brake_in_emergency() {
+    if (mode_ == role::merge || !radar_.sees(now_)) {
+        return;
+    }
+    if (const auto deceleration = emergency_braking(self_, radar_.at(now_), setup_.limits.brake)) {
+        command_ = std::min(command_, -*deceleration);
+    }
+}
+
 void driver::lead(double dt) {
     command_ = cruise_ ? std::clamp(cruise_gain * (*cruise_ - self_.v), -cruise_limit, cruise_limit)
                        : setup_.plan.command(now_);
     if (radar_.sees(now_)) {
-        command_ = std::min(command_, keep_time_gap(dt));
+        command_ = std::min(command_, keep_time_gap(full_time_gap, radar_.at(now_).a, dt));
     } else {
         time_gap_.reset();
     }
@@ -234,6 +276,9 @@ void driver::follow(double dt) {
     if (mode_ == role::radar) {
         radar_until_ = now_;
         time_gap_.reset();
+    }
+    if (opens_since_) {
+        rejoin();
     }
     adjust_distance(dt);
     const auto mode_ahead = heard(ahead_)->last().mode;
@@ -252,7 +297,9 @@ void driver::follow(double dt) {
     }
     const bool leader_known = !leader_silent && heard(lead_) != nullptr;
     fade(setup_.uses_leader && !broken && (leader_known || reports_leader(ahead_)), dt);
-    command_ = law(reference_to(ahead_, distance_));
+    const auto ahead = reference_to(ahead_, distance_);
+    command_ = law(ahead);
+    heed_radar(ahead);
 }
 
 void driver::fade(bool leader_counts, double dt) {
@@ -355,46 +402,68 @@ bool driver::has_room() const {
            self_.x - follower->at(now_).x > setup_.spacing - merge_tolerance;
 }
 
+void driver::rejoin() {
+    opens_since_.reset();
+    measure_distance(*heard(ahead_), now_);
+    choose_leader(heard(ahead_)->last());
+}
+
 void driver::follow_by_radar(double dt) {
+    const auto* who = heard(ahead_);
     if (mode_ != role::radar) {
         radar_since_ = now_;
         time_gap_.reset();
-        enter(role::radar, heard(ahead_) == nullptr ? ahead_ + " ahead was never received: only the radar sees it"
-                                                    : ahead_ + " ahead is silent: only the radar sees it");
+        enter(role::radar, ahead_ + (who == nullptr   ? " ahead was never received: only the radar sees it"
+                                     : silent(ahead_) ? " ahead is silent: only the radar sees it"
+                                                      : " ahead is received too rarely: it follows by its radar"));
     }
     fade(setup_.uses_leader && lead_ != ahead_ && !silent(lead_) && heard(lead_) != nullptr, dt);
-    const double since = now_ - radar_since_;
     // At first as before, because most interruptions are short, and an update that has just become old is more exact.
     auto seen = radar_.at(now_);
     seen.x += setup_.limits.length;
     reference ahead{.where = seen, .command = seen.a, .distance = distance_};
-    if (heard(ahead_) != nullptr) {
+    if (who != nullptr) {
         // What was inferred counts in full, but once the radar has refuted it, as little as if nothing had been.
-        const double from = refuted_ ? radar_since_ : std::max(radar_since_, inferred_);
-        ahead = blend(reference_to(ahead_, distance_), ahead, std::min(1.0, (now_ - from) / radar_share_time));
+        const double silent_since = now_ - who->silence(now_) + silent_after / setup_.hz;
+        const double from = std::max({radar_since_, silent_since, refuted_ ? radar_since_ : inferred_});
+        ahead = blend(reference_to(ahead_, distance_), ahead, std::clamp((now_ - from) / radar_share_time, 0.0, 1.0));
     }
     command_ = law(ahead);
-    if (since > hold_time) {
-        lead_those_behind();
-        const double share = std::min(1.0, (since - hold_time) / switch_time);
-        command_ += share * (keep_time_gap(dt) - command_);
-        const double kept = setup_.limits.length + standstill_gap + *time_gap_ * self_.v;
-        distance_ += share * (kept - distance_);
+    heed_radar(ahead);
+    if (link_.is_poor() && !opens_since_) {
+        opens_since_ = now_;
+    }
+    if (opens_since_) {
+        open_gap(ahead.where.a, dt);
     }
 }
 
-double driver::keep_time_gap(double dt) {
+void driver::open_gap(double acceleration_ahead, double dt) {
+    lead_those_behind();
+    const double share = std::min(1.0, (now_ - *opens_since_) / switch_time);
+    command_ += share * (keep_time_gap(full_time_gap * link_.gap_share(), acceleration_ahead, dt) - command_);
+    distance_ += share * (setup_.limits.length + kept_gap() - distance_);
+}
+
+/// What it keeps by radar, at its present time gap; behind a poor link, never less than it would otherwise.
+double driver::kept_gap() const {
+    const double least = mode_ == role::lead ? standstill_gap : wanted() - setup_.limits.length;
+    return std::max(least, standstill_gap + *time_gap_ * self_.v);
+}
+
+/// \param most s: up to this time gap it opens; a larger one stays as it is
+double driver::keep_time_gap(double most, double acceleration_ahead, double dt) {
     const auto rear = radar_.at(now_);
     const double gap = rear.x - self_.x;
     const double pace = std::max(self_.v, standstill_gap);
     if (!time_gap_) {
         time_gap_ = std::clamp((gap - standstill_gap) / pace, 0.0, full_time_gap);
     }
-    time_gap_ = std::min(full_time_gap, *time_gap_ + open_speed / pace * dt);
-    const double error = gap - standstill_gap - *time_gap_ * self_.v;
+    time_gap_ = std::max(*time_gap_, std::min(most, *time_gap_ + open_speed / pace * dt));
+    const double error = gap - kept_gap();
     const double limited = std::clamp(error, -setup_.law.max_error, setup_.law.max_error);
     // The smaller the gap, the more of the acceleration ahead is fed forward.
-    return (1 - *time_gap_ / full_time_gap) * rear.a +
+    return (1 - *time_gap_ / full_time_gap) * acceleration_ahead +
            (rear.v - self_.v + radar_gain * limited) / std::max(*time_gap_, least_time_gap);
 }
 

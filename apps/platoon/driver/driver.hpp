@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "platoon/driver/link_quality.hpp"
 #include "platoon/driver/manoeuvre.hpp"
 #include "platoon/driver/radar_track.hpp"
 #include "platoon/driver/spacing_law.hpp"
@@ -94,7 +95,14 @@ class driver {
     [[nodiscard]] bool reports_leader(const std::string& name) const;
     [[nodiscard]] bool drops(const std::string& from, const state& told, double now);
     [[nodiscard]] bool may_infer(const state& ahead, const state& beyond) const;
-    [[nodiscard]] double keep_time_gap(double dt);
+    [[nodiscard]] double keep_time_gap(double most, double acceleration_ahead, double dt);
+    void open_gap(double acceleration_ahead, double dt);
+    [[nodiscard]] double kept_gap() const;
+    void rejoin();
+    void heed_radar(const reference& ahead);
+    void brake_in_emergency();
+    [[nodiscard]] bool keeps_off() const;
+    void measure_distance(const track& ahead, double now);
     [[nodiscard]] bool has_room() const;
     [[nodiscard]] double wanted() const;
     void adjust_distance(double dt);
@@ -126,8 +134,10 @@ class driver {
     std::optional<double> to_beyond_;   ///< desired distance of the one ahead to the one beyond, of its last update
     double fallback_since_ = 0;
     double radar_since_ = 0, radar_until_ = -1e9;
-    std::optional<double> time_gap_; ///< s, that it keeps by radar at present
-    std::optional<double> cruise_;   ///< m/s, if it leads without a plan
+    link_quality link_;                 ///< to the one ahead
+    std::optional<double> opens_since_; ///< when it began to open the gap, because that link is poor
+    std::optional<double> time_gap_;    ///< s, that it keeps by radar at present
+    std::optional<double> cruise_;      ///< m/s, if it leads without a plan
     radar_track radar_;
     std::map<std::string, track> tracks_;
     std::set<std::string> dropped_; ///< the reasons, with the vehicle

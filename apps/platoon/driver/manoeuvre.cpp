@@ -3,9 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace platoon {
 namespace {
+
+constexpr double settling_time = 30;   // s, at least, until the response to a sine is periodic, ...
+constexpr double settling_periods = 4; // ... and its periods
+constexpr double periods_measured = 4;
 
 // Up to `level` and back to 0, both at `jerk`, with an area that equals the `change` of speed.
 double trapezoid(double t, double change, double level, double jerk) {
@@ -20,12 +25,25 @@ double trapezoid(double t, double change, double level, double jerk) {
 } // namespace
 
 double manoeuvre::command(double t) const {
-    const double again = brake_at + (speed - slow) / brake + brake / jerk + slow_for;
-    return trapezoid(t - again, speed - slow, speed_up, jerk) - trapezoid(t - brake_at, speed - slow, brake, jerk);
+    if (period > 0) {
+        return t < brake_at ? 0 : sine * std::sin(phase(t));
+    }
+    return trapezoid(t - recovery(), speed - slow, speed_up, jerk) - trapezoid(t - brake_at, speed - slow, brake, jerk);
+}
+
+double manoeuvre::recovery() const {
+    return period > 0 ? INFINITY : brake_at + (speed - slow) / brake + brake / jerk + slow_for;
 }
 
 double manoeuvre::end() const {
-    return brake_at + (speed - slow) / brake + brake / jerk + slow_for + (speed - slow) / speed_up + speed_up / jerk;
+    return period > 0 ? periodic_from() + periods_measured * period
+                      : recovery() + (speed - slow) / speed_up + speed_up / jerk;
 }
+
+double manoeuvre::periodic_from() const {
+    return brake_at + std::max(settling_periods, std::ceil(settling_time / period)) * period;
+}
+
+double manoeuvre::phase(double t) const { return 2 * std::numbers::pi * (t - brake_at) / period; }
 
 } // namespace platoon

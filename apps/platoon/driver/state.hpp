@@ -18,7 +18,8 @@ enum class role : std::uint8_t {
     follow,   ///< follows the leader and the one ahead
     degraded, ///< the leader is silent, or the platoon is broken ahead: it follows the one ahead, and heeds the leader
               ///< only as far as that reports it
-    radar,    ///< the one ahead is silent: it follows what its radar sees, at a larger and larger distance
+    radar,    ///< the one ahead is silent, or too few of its updates arrive: it follows what its radar sees, at a
+              ///< larger and larger distance
     fallback, ///< the one ahead is silent, and there is no radar: it brakes to a halt
     merge,    ///< in the next lane, beside the gap that opens for it
     leave     ///< drives on as before, and is about to leave the lane

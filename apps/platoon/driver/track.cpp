@@ -12,16 +12,17 @@ constexpr double drift = 1e-4;        // s/s, by which two clocks may differ in 
 
 } // namespace
 
-void track::receive(const state& heard, double now) {
+bool track::receive(const state& heard, double now) {
     const bool restarted = last_ && heard.t < last_->t - horizon;
     if (last_ && !restarted && heard.t <= last_->t) {
-        return; // overtaken by a newer one
+        return false; // overtaken by a newer one
     }
     // The clocks are not synchronised, but the difference shows how much longer an update took than the fastest one.
     const double difference = now - heard.t;
     offset_ = !last_ || restarted ? difference : std::min(difference, offset_ + drift * (now - received_));
     last_ = base_ = heard;
     received_ = now;
+    return true;
 }
 
 void track::assume(double command, double now) {

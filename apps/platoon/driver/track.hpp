@@ -12,7 +12,8 @@ namespace platoon {
 class track {
   public:
     /// \param now local time, s
-    void receive(const state& heard, double now);
+    /// \return false if a newer update has been received before, or this one
+    bool receive(const state& heard, double now);
     [[nodiscard]] bool known() const noexcept { return last_.has_value(); }
     [[nodiscard]] const state& last() const noexcept { return *last_; }
     /// How long it has been silent, by local time alone.

@@ -115,7 +115,9 @@ class simulated_platoon {
             case scheduled_event::look: look(next.at, watch); break;
             }
         }
-        return result_.result();
+        auto out = result_.result();
+        out.ended = end >= what_.setup.plan.end();
+        return out;
     }
 
   private:
@@ -248,7 +250,14 @@ class simulated_platoon {
             where.push_back(truth(i, now));
             desired.push_back(all_[i].who.desired_distance());
         }
+        const auto& plan = what_.setup.plan;
+        if (now >= plan.recovery()) {
+            result_.begin_recovery();
+        }
         result_.sample(where, desired);
+        if (plan.period > 0 && now >= plan.periodic_from() && now < plan.end()) {
+            result_.correlate(plan.phase(now), where, desired);
+        }
         if (watch) {
             std::vector<sighting> seen;
             for (std::size_t i = 0; i < all_.size(); ++i) {

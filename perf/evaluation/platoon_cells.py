@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Drives a platoon through each kind of loss, by the control law alone: whether vehicles with a radar collide.
+
+    platoon_cells.py [--programs build/release/apps] [--seeds 1000] [--first-seed 1] [--vehicles 20] [--seconds 0]
+                     [--hz 10,25,50] [-o FILE]
+
+Prints the two tables of docs/platoon.md, of equal vehicles and of vehicles that differ: for each rate and loss, the smallest
+gap, the smallest time to a collision, and the collisions, if there are any. -o writes all figures as JSON. Ends with 1 if
+vehicles collided.
+"""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+LOSSES = [(0, 0), *((loss, burst) for burst in (0, 10, 30) for loss in (10, 20, 30, 50, 80)), (100, 0)]
+RATES = (10, 25, 50)
+FLEETS = {"equal vehicles": (), "lags of 0.2 to 0.5 s, brakes of 5.5 to 8 m/s²": ("--lags", 0.2, 0.5, "--brakes", 5.5, 8)}
+
+
+def driven(options, hz, loss, burst, fleet):
+    seeds = 1 if loss == 0 and not fleet else options.seeds  # without loss, all drives of equal vehicles are the same
+    arguments = ["--vehicles", options.vehicles, "--hz", hz, "--loss", loss, "--burst", burst, "--seeds", seeds,
+                 "--first-seed", options.first_seed, "--json", *fleet]
+    if options.seconds:
+        arguments += ["--seconds", options.seconds]
+    done = subprocess.run([os.path.join(options.programs, "cles-platoon"), "simulate", *map(str, arguments)],
+                          capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 1, 4):  # 1: a collision; 4: the manoeuvre did not end: the result contains both
+        raise SystemExit(f"platoon_cells.py: {' '.join(map(str, arguments))}: {done.stderr.strip()}")
+    found = json.loads(done.stdout)
+    return {"hz": hz, "loss_percent": loss, "burst": burst, "seeds": seeds, "collisions": found["collisions"],
+            "least_gap": found["least_gap"], "least_time_to_collision": found["least_time_to_collision"],
+            "string_ratio": found["string_ratio"], "stand_or_apart": found["broken"]}
+
+
+def name_of(loss, burst):
+    if loss in (0, 100):
+        return "nothing" if loss == 0 else "everything"
+    return f"{loss} %, " + (f"in bursts of {burst}" if burst else "independently")
+
+
+def told(cell):
+    time = cell["least_time_to_collision"]
+    text = f"{cell['least_gap']:.1f} m, " + (f"{time:.1f} s" if time is not None else "never nearer")
+    return text + (f", {cell['collisions']} COLLISIONS" if cell["collisions"] else "")
+
+
+def table(cells, rates):
+    lines = ["| updates lost | " + " | ".join(f"{hz} Hz" for hz in rates) + " |", "| --- |" + " --- |" * len(rates)]
+    for loss, burst in LOSSES:
+        row = [cell for cell in cells if (cell["loss_percent"], cell["burst"]) == (loss, burst)]
+        lines.append(f"| {name_of(loss, burst)} | " + " | ".join(map(told, row)) + " |")
+    return "\n".join(lines)
+
+
+def main():
+    parser = argparse.ArgumentParser(description="Drives a platoon through each kind of loss, by the control law alone.")
+    parser.add_argument("--programs", default="build/release/apps")
+    parser.add_argument("--seeds", type=int, default=1000)
+    parser.add_argument("--first-seed", type=int, default=1)
+    parser.add_argument("--vehicles", type=int, default=20)
+    parser.add_argument("--seconds", type=float, default=0, help="of each drive (until five seconds after the manoeuvre)")
+    parser.add_argument("--hz", default=",".join(map(str, RATES)), help="the rates")
+    parser.add_argument("-o", "--output", help="a file for all figures")
+    options = parser.parse_args()
+    rates = [int(hz) for hz in options.hz.split(",")]
+    result = {}
+    for name, fleet in FLEETS.items():
+        result[name] = [driven(options, hz, loss, burst, fleet) for loss, burst in LOSSES for hz in rates]
+        print(f"{name}:\n\n{table(result[name], rates)}\n", flush=True)
+    if options.output:
+        Path(options.output).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    collisions = sum(cell["collisions"] for cells in result.values() for cell in cells)
+    print(f"{collisions} collisions in {sum(cell['seeds'] for cells in result.values() for cell in cells)} drives")
+    return 1 if collisions else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
