@@ -30,6 +30,14 @@ class Block:
         return "any-numbers" in self.note.split()
 
     @property
+    def in_ci(self) -> bool:
+        return self.note == "ci"
+
+    @property
+    def on_two_hosts(self) -> bool:
+        return "two-hosts" in self.note.split()
+
+    @property
     def reason(self) -> str:
         return self.note.removeprefix("no-test").removeprefix(":").strip()
 

@@ -12,13 +12,18 @@
 - A command that ends in ` &` goes on in the background; the next one waits until it has printed what the page says, or
   anything; its log, on stderr, is left out. It is stopped at the end of its page.
 - Nodes find each other in a group of the page's own.
-- "sh no-test: REASON" and "console no-test: REASON" are left out.
+- "sh no-test: REASON" and "console no-test: REASON" are left out, but not in README.md.
+- "sh ci" blocks are too large for a test: each of their commands has to be one that .ci/run runs.
+- "two-hosts" blocks run a second time, after the page, on two hosts as below: on the first host up to the last command that
+  goes on in the background, on the second one what follows it.
 - "console host-1" and "console host-2" blocks run on two hosts with a cable between them (network namespaces), each in a
   shell of its own, which has eth0 with 192.168.1.11 and 192.168.1.12. There ports and the group are those of the page.
   Where no namespaces can be made it ends with 77; with CI=true that is a failure.
 
-The commands run from ROOT, with FOLDER (where `cles` is) in the path. So that runs do not meet, ports 253xx stand for free
-ones (the default 25370 too, and the multicast group's), /tmp for a fresh folder, and build/release for BUILD.
+The commands run from ROOT, with FOLDER (where `cles` is) in the path. So that runs do not meet, /tmp stands for a fresh
+folder, and build/release for BUILD. On a host that has only loopback, as the network namespace of a test has, nothing else
+differs from what the page says. Elsewhere ports 253xx (the default 25370 too, and the multicast group's) stand for free ones;
+a program that listens at the default port without being told so then fails if the port is taken.
 """
 
 import argparse
@@ -33,6 +38,7 @@ import sys
 import tempfile
 import time
 import unittest
+from dataclasses import dataclass
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / "cli"))
@@ -169,55 +175,102 @@ def free_udp_port() -> int:
         return probe.getsockname()[1]
 
 
+def has_only_loopback() -> bool:
+    return [name for _, name in socket.if_nameindex()] == ["lo"]
+
+
+@dataclass
+class Step:
+    """A command of a page, and on which of its hosts it runs."""
+    block: Block
+    line: int
+    command: str
+    expected: list[str]
+    host: str
+
+
+def steps_of(blocks: list[Block]) -> list[Step]:
+    return [Step(block, *command, block.host) for block in blocks for command in commands_of(block)]
+
+
+def steps_on_two_hosts(blocks: list[Block]) -> list[Step]:
+    steps = []
+    for block in blocks:
+        commands = commands_of(block)
+        last = max((at for at, (_, command, _) in enumerate(commands) if command.endswith(" &")), default=-1)
+        steps += [Step(block, *command, "1" if at <= last else "2") for at, command in enumerate(commands)]
+    return steps
+
+
+def check_left_out(page: Path, root: Path, block: Block) -> list[str]:
+    where = f"{page}:{block.line}"
+    if block.in_ci:
+        ci = (root / ".ci" / "run").read_text(encoding="utf-8")
+        return [f"{where}: .ci/run does not run '{command}'" for _, command, _ in commands_of(block)
+                if not re.search(rf"(?<!\S){re.escape(command)}(?!\S)", ci)]
+    if page.name == "README.md":
+        return [f"{where}: every command of the README has to be tested"]
+    if not block.reason:
+        return [f"{where}: 'no-test' needs a reason, as in 'no-test: two machines'"]
+    return []
+
+
 def run_page(page: Path, root: Path, build: Path, path: Path) -> list[str]:
+    blocks = [block for block in blocks_of(page) if block.language in ("sh", "console")]
+    tested = [block for block in blocks if not block.skipped and not block.in_ci]
+    problems = [problem for block in blocks if block not in tested for problem in check_left_out(page, root, block)]
+    hosts = any(block.host for block in tested)
+    for block in tested:
+        if bool(block.host) != hosts:
+            problems.append(f"{page}:{block.line}: on which host? 'host-1' or 'host-2' stands behind the language")
+    try:
+        problems += run_steps(page, steps_of([block for block in tested if bool(block.host) == hosts]), root, build, path)
+        apart = steps_on_two_hosts([block for block in tested if block.on_two_hosts])
+        if apart:
+            problems += run_steps(page, apart, root, build, path)
+    except Mistake as mistake:
+        problems.append(f"{page}: {mistake}")
+    return problems
+
+
+def run_steps(page: Path, steps: list[Step], root: Path, build: Path, path: Path) -> list[str]:
     problems: list[str] = []
-    blocks = blocks_of(page)
-    hosts = Hosts(("eth0", "192.168.1.11/24"), ("eth0", "192.168.1.12/24")) if any(b.host for b in blocks) else None
+    hosts = Hosts(("eth0", "192.168.1.11/24"), ("eth0", "192.168.1.12/24")) if any(s.host for s in steps) else None
     scratch = Path(tempfile.mkdtemp(prefix="cles-docs-"))
-    substitution = Substitution(build, scratch, own_ports=hosts is not None)
+    own_ports = hosts is not None or has_only_loopback()
+    substitution = Substitution(build, scratch, own_ports)
     programs = scratch / "bin"
     programs.mkdir()
     if not shutil.which("nc"):
         (programs / "nc").symlink_to(Path(__file__).resolve().parent / "netcat.py")
     inherited = {name: value for name, value in os.environ.items() if name != "CLES_AT"}
-    environment = {**inherited, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "COLUMNS": "120",
+    environment = {**inherited, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "COLUMNS": "120", "CLES_CONTEXT": "",
                    "CLES_MULTICAST": f"lo,239.255.25.37:{free_udp_port()}",
                    "PATH": os.pathsep.join([str(path), str(programs), os.environ["PATH"]])}
-    if hosts:
+    if own_ports:
         del environment["CLES_MULTICAST"]
+    if hosts:
         shells = {"1": Shell(root, environment, scratch / "host-1", tuple(hosts.inside(hosts.near))),
                   "2": Shell(root, environment, scratch / "host-2", tuple(hosts.inside(hosts.far)))}
     else:
         shells = {"": Shell(root, environment, scratch)}
-    count = 0
     try:
-        for block in blocks:
-            if block.language not in ("sh", "console"):
+        for step in steps:
+            shell = shells[step.host]
+            where = f"{page}:{step.line}: $ {step.command}" + (f" (on host {step.host})" if step.host else "")
+            to_run = substitution.to_run(step.command)
+            if to_run.endswith(" &"):
+                shell.start(to_run.removesuffix(" &"), step.expected, substitution)
+                print(f"ok   {where}")
                 continue
-            if block.skipped:
-                if not block.reason:
-                    problems.append(f"{page}:{block.line}: 'no-test' needs a reason, as in 'no-test: two machines'")
-                continue
-            if block.host not in shells:
-                problems.append(f"{page}:{block.line}: on which host? 'host-1' or 'host-2' stands behind the language")
-                continue
-            shell = shells[block.host]
-            for line, command, expected in commands_of(block):
-                count += 1
-                where = f"{page}:{line}: $ {command}"
-                to_run = substitution.to_run(command)
-                if to_run.endswith(" &"):
-                    shell.start(to_run.removesuffix(" &"), expected, substitution)
-                    print(f"ok   {where}")
-                    continue
-                status, output = shell.run(to_run)
-                printed = substitution.as_on_page(output).splitlines()
-                if block.language == "sh" and status != 0:
-                    problems.append(f"{where}\nended with {status}:\n" + "\n".join(printed))
-                elif block.language == "console" and not agree(block, expected, printed):
-                    problems.append(f"{where}\n{difference(expected, printed)}")
-                else:
-                    print(f"ok   {where}")
+            status, output = shell.run(to_run)
+            printed = substitution.as_on_page(output).splitlines()
+            if step.block.language == "sh" and status != 0:
+                problems.append(f"{where}\nended with {status}:\n" + "\n".join(printed))
+            elif step.block.language == "console" and not agree(step.block, step.expected, printed):
+                problems.append(f"{where}\n{difference(step.expected, printed)}")
+            else:
+                print(f"ok   {where}")
     except Mistake as mistake:
         problems.append(f"{page}: {mistake}")
     finally:
@@ -226,7 +279,7 @@ def run_page(page: Path, root: Path, build: Path, path: Path) -> list[str]:
         if hosts:
             hosts.close()
         shutil.rmtree(scratch, ignore_errors=True)
-    print(f"{page.name}: {count} commands, {len(problems)} problems")
+    print(f"{page.name}: {len(steps)} commands, {len(problems)} problems")
     return problems
 
 
@@ -260,13 +313,17 @@ false
 BAD = [("```console\n$ echo one\ntwo\n```\n", "+one"), ("```console any-numbers\n$ echo 1 b\n1 c\n```\n", "+1 b"),
        ("```console any-numbers\n$ echo version 1.0.0\nversion 0.1.0\n```\n", "+version 1.0.0"),
        ("```sh\nfalse\n```\n", "ended with 1"),
-       ("```sh no-test\ntrue\n```\n", "needs a reason"), ("```sh host-1\ntrue\n```\n```sh\ntrue\n```\n", "on which host"), ("```console\necho\n```\n", "begins with '$ '")]
+       ("```sh no-test\ntrue\n```\n", "needs a reason"), ("```sh ci\nscripts/test\nscripts/other\n```\n", "not run 'scripts/other'"),
+       ("```sh two-hosts\n(echo up; exec sleep 20) &\n! grep -q 192.168.1.12 /proc/net/fib_trie\n```\n", "(on host 2)"),
+       ("```sh host-1\ntrue\n```\n```sh\ntrue\n```\n", "on which host"), ("```console\necho\n```\n", "begins with '$ '")]
 
 
 def self_test() -> int:
     failures = []
     with tempfile.TemporaryDirectory() as folder:
         page = Path(folder) / "page.md"
+        (Path(folder) / ".ci").mkdir()
+        (Path(folder) / ".ci" / "run").write_text("tested test release scripts/test\n", encoding="utf-8")
 
         def problems(text: str) -> list[str]:
             page.write_text(text, encoding="utf-8")
