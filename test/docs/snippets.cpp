@@ -37,6 +37,24 @@ struct pose {
 BOOST_DESCRIBE_STRUCT(pose, (), (x, y, heading))
 CLES_DEFAULTS(pose, (heading))
 
+struct label {
+    std::string klass;
+    double font_size = 12;
+};
+BOOST_DESCRIBE_STRUCT(label, (), (klass, font_size))
+CLES_NAMES(label, (klass, "class"), (font_size, "fontSize"))
+CLES_DEFAULTS(label, (font_size))
+
+struct fix {
+    double lat = 0;
+    double lon = 0;
+    float speed = 0;
+};
+BOOST_DESCRIBE_STRUCT(fix, (), (lat, lon, speed))
+CLES_FIELD(fix, lat, "deg", "latitude, WGS 84", -90, 90)
+CLES_FIELD(fix, lon, "deg", "longitude, WGS 84", -180, 180)
+CLES_FIELD(fix, speed, "m/s")
+
 bool only_look(const cles::access& asked) { return asked.verb == cles::verb::pull || asked.verb == cles::verb::bind; }
 
 void a_service();
@@ -57,6 +75,7 @@ void record_camera(const cles::request& asked);
 void a_task_to_repeat(cles::registrar& tasks);
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres);
 asio::awaitable<void> asking(cles::service& car);
+asio::awaitable<void> asking_for_a_member(cles::service& car);
 asio::awaitable<void> finding(asio::io_context& io);
 asio::awaitable<void> errors(cles::service& car);
 asio::awaitable<void> feeds(cles::service& car, position here);
@@ -76,8 +95,13 @@ void a_service() {
 
 void a_secured_service() {
     asio::io_context io;
-    cles::service secured{io,
-                          {.name = "car1", .listen = {"tls://0.0.0.0:0"}, .security = cles::secured("/etc/cles/keys")}};
+    cles::service secured{
+        io, {.name = "car1", .listen = {"tls://0.0.0.0:0"}, .security = cles::secured("/var/lib/cles/keys")}};
+}
+
+asio::awaitable<void> asking_for_a_member(cles::service& car) {
+    const auto fix = co_await car.async_pull("car0:position", cles::call_options{}.on_behalf_of("operator"));
+    std::cout << fix.text;
 }
 
 void an_open_service() {
@@ -108,8 +132,9 @@ asio::awaitable<void> asking(cles::service& car) {
     co_await car.async_push("car0:target", where);
     const auto metres = co_await car.async_delegate<double>("car0:park", where, cles::call_options{}.deadline(20s));
     const auto answer = co_await car.async_request("PULL car0:tyre/2"); // JSON, as text
+    const auto inside = co_await car.async_pull<double>("car0:tyre/" + cles::encode_parameter("front left"));
     co_await car.async_push("car0:brake", 0.8, cles::call_options{}.urgent());
-    std::cout << metres << answer.text;
+    std::cout << metres << answer.text << inside;
 }
 
 asio::awaitable<void> finding(asio::io_context& io) {
