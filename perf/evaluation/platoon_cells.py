@@ -3,11 +3,11 @@
 """Drives a platoon through each kind of loss, by the control law alone: whether vehicles with a radar collide.
 
     platoon_cells.py [--programs build/release/apps] [--seeds 1000] [--first-seed 1] [--vehicles 20] [--seconds 0]
-                     [--hz 10,25,50] [-o FILE]
+                     [--hz 10,25,50] [--quick] [-o FILE]
 
 Prints the two tables of docs/platoon.md, of equal vehicles and of vehicles that differ: for each rate and loss, the smallest
-gap, the smallest time to a collision, and the collisions, if there are any. -o writes all figures as JSON. Ends with 1 if
-vehicles collided.
+gap, the smallest time to a collision, and the collisions, if there are any. -o writes all figures as JSON. --quick drives
+one short drive of each kind. Ends with 1 if vehicles collided.
 """
 
 import argparse
@@ -15,7 +15,8 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
+
+import result_file
 
 LOSSES = [(0, 0), *((loss, burst) for burst in (0, 10, 30) for loss in (10, 20, 30, 50, 80)), (100, 0)]
 RATES = (10, 25, 50)
@@ -66,17 +67,25 @@ def main():
     parser.add_argument("--vehicles", type=int, default=20)
     parser.add_argument("--seconds", type=float, default=0, help="of each drive (until five seconds after the manoeuvre)")
     parser.add_argument("--hz", default=",".join(map(str, RATES)), help="the rates")
+    parser.add_argument("--quick", action="store_true", help="one drive of 10 s of each kind")
     parser.add_argument("-o", "--output", help="a file for all figures")
     options = parser.parse_args()
+    if options.quick:
+        options.seeds, options.seconds = 1, 10
     rates = [int(hz) for hz in options.hz.split(",")]
     result = {}
     for name, fleet in FLEETS.items():
         result[name] = [driven(options, hz, loss, burst, fleet) for loss, burst in LOSSES for hz in rates]
         print(f"{name}:\n\n{table(result[name], rates)}\n", flush=True)
+    cells = [cell for group in result.values() for cell in group]
+    collisions, drives = (sum(cell[count] for cell in cells) for count in ("collisions", "seeds"))
     if options.output:
-        Path(options.output).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
-    collisions = sum(cell["collisions"] for cells in result.values() for cell in cells)
-    print(f"{collisions} collisions in {sum(cell['seeds'] for cells in result.values() for cell in cells)} drives")
+        figures = [{"name": "collisions", "what": f"drives that ended in a collision, of {drives}", "value": collisions,
+                    "target": 0, "reached": collisions == 0},
+                   {"name": "least_gap", "what": "the smallest gap of all drives", "unit": "m",
+                    "value": min(cell["least_gap"] for cell in cells)}]
+        result_file.write(options.output, {"cells": result, "figures": figures})
+    print(f"{collisions} collisions in {drives} drives")
     return 1 if collisions else 0
 
 

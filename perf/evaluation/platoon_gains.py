@@ -3,11 +3,12 @@
 """Measures how much larger the errors, speeds and accelerations of each vehicle of a platoon are than those of the one ahead,
 by the control law alone: in both halves of the manoeuvre, and at single frequencies.
 
-    platoon_gains.py [--programs build/release/apps] [--vehicles 20] [--hz 25] [--periods 2,3,4,6,8,12,20,30,60] [-o FILE]
+    platoon_gains.py [--programs build/release/apps] [--vehicles 20] [--hz 25] [--periods 2,3,4,6,8,12,20,30,60]
+                     [--quick] [-o FILE]
 
 Prints the two tables of docs/platoon.md: the gains of the first follower over the leader (of its error, that of the second one
 over the first), and the largest of all others; at single frequencies, also the largest acceleration over that of the leader.
-No update is lost. -o writes the gains of each vehicle as JSON.
+No update is lost. -o writes the gains of each vehicle as JSON. --quick drives five vehicles and two sines.
 """
 
 import argparse
@@ -15,7 +16,8 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
+
+import result_file
 
 KINDS = ("error", "speed", "acceleration")
 
@@ -61,8 +63,11 @@ def main():
     parser.add_argument("--vehicles", type=int, default=20)
     parser.add_argument("--hz", type=int, default=25)
     parser.add_argument("--periods", default="2,3,4,6,8,12,20,30,60", help="of the sine, s")
+    parser.add_argument("--quick", action="store_true", help="five vehicles and two sines")
     parser.add_argument("-o", "--output", help="a file for the gains of each vehicle")
     options = parser.parse_args()
+    if options.quick:
+        options.vehicles, options.periods = 5, "4,20"
     drive = simulated(options)
     halves = {"braking": drive["braking"], "recovery": drive["recovery"]}
     print(table("half of the manoeuvre", halves, periodic=False) + "\n", flush=True)
@@ -70,8 +75,10 @@ def main():
              for period in options.periods.split(",")}
     print(table("period of the sine", sines, periodic=True))
     if options.output:
-        result = {"vehicles": options.vehicles, "hz": options.hz, "halves": halves, "sines": sines}
-        Path(options.output).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+        figures = [{"name": f"{half}_error_gain", "value": max(filter(None, gains["error"])), "unit": "times",
+                    "what": f"largest gain of the error from vehicle to vehicle, {half}"} for half, gains in halves.items()]
+        result_file.write(options.output, {"vehicles": options.vehicles, "hz": options.hz, "halves": halves, "sines": sines,
+                                           "figures": figures})
     return 0
 
 

@@ -29,6 +29,8 @@ SECTIONS = (
             "Plugin and manager have less than 300 lines.", ("clesd", "cles_dsgd", "cles_plugin_sgd")),
     Section("platoon", "Platooning", "Section 4.2, the first case study: each vehicle BINDs to the localization of its leader "
             "and of the one ahead.", ("cles_command", "clesd", "cles_platoon")),
+    Section("platoon_cells", "Platooning: collisions at each rate with each loss, by the control law alone", "", ("cles_platoon",)),
+    Section("platoon_gains", "Platooning: gains from vehicle to vehicle, by the control law alone", "", ("cles_platoon",)),
     Section("strike_latency", "Allocation of tasks: from track to strike",
             "Section 4.2, the second case study: DELEGATE of video processing to a node that offers it, tracks to all that are "
             "bound, and DELEGATE of a strike.", ("clesd", "cles_jadc2", "cles_plugin_fmv", "cles_plugin_strike")),

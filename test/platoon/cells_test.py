@@ -29,18 +29,20 @@ class Cells(unittest.TestCase):
     def test_nobody_collides_at_any_rate_with_any_loss(self):
         code, found, said = run("platoon_cells.py", "--seeds", 3, "--first-seed", 170, "--seconds", 20)
         self.assertEqual(code, 0, said)
-        self.assertEqual([len(cells) for cells in found.values()], [51, 51])
-        for cells in found.values():
+        fleets = found["cells"]
+        self.assertEqual([len(cells) for cells in fleets.values()], [51, 51])
+        for cells in fleets.values():
             for cell in cells:
                 self.assertGreater(cell["least_gap"], 0, cell)
-        without = [cell for cell in found["equal vehicles"] if (cell["loss_percent"], cell["burst"]) in ((0, 0), (10, 0))]
+        self.assertEqual({figure["name"]: figure["value"] for figure in found["figures"]}["collisions"], 0)
+        without = [cell for cell in fleets["equal vehicles"] if (cell["loss_percent"], cell["burst"]) in ((0, 0), (10, 0))]
         self.assertEqual(len(without), 6)
         for cell in without:  # the gap does not open
             self.assertGreater(cell["least_gap"], 9, cell)
             self.assertLess(cell["string_ratio"], 1.02, cell)
 
     def test_the_gains_of_each_vehicle(self):
-        code, found, said = run("platoon_gains.py", "--vehicles", 5, "--periods", "4,20")
+        code, found, said = run("platoon_gains.py", "--quick")
         self.assertEqual(code, 0, said)
         self.assertEqual(set(found["halves"]), {"braking", "recovery"})
         self.assertEqual(set(found["sines"]), {"4 s", "20 s"})
