@@ -246,29 +246,38 @@ class Teller(Process):
                     raise Trouble(f"{self.name} did not report '{' or '.join(kinds)} {words}', but {self.events}; "
                                   f"{self.said_wrong()}")
 
-    def order_by_hand(self, by=""):
+    def order_by_hand(self, by="", since=0.0, stopped=()):
         """Acts as an operator (--operator): orders and confirms a strike on a target in the picture, detected by that node, and on
-        another target if that one is out of sight by then; on one that was not attacked yet, if there is one. Returns the
-        decision."""
+        another target if that one is out of sight by then; on one that was not attacked yet, if there is one. Older pictures than
+        `since` (seconds since 1970) do not count. The `stopped` processes are stopped at the last moment before the order is
+        given: a node that is stopped for longer is taken for lost, and gets no order. Returns the decision."""
         after = self.told()
         while True:
             picture = self.wait_for("picture", after=after)
             after = self.events.index(picture, after) + 1
-            targets = picture["data"]["tracks"] if by in ("", picture["data"]["by"]) else []
-            attacked = [each["data"]["target"] for each in self.all("decided")] + picture["data"].get("engaged", [])
-            fresh = [target for target in targets if target["id"] not in attacked]
-            if targets:
+            seen = picture["data"]
+            attacked = [each["data"]["target"] for each in self.all("decided")] + seen.get("engaged", [])
+            # Those first that were seen in this very frame: where others are is predicted.
+            targets = sorted(seen["tracks"], key=lambda target: (target["id"] in attacked, target["missed"]))
+            if not targets or by not in ("", seen["by"]) or seen["captured"] < since:
+                continue
+            after = self.told()
+            best = targets[0]["id"]
+            self._type(f"strike {best} again" if best in attacked else f"strike {best}")
+            if self.wait_for(("read_back", "operator"), after=after)["event"] == "read_back":
                 after = self.told()
-                order = f"strike {fresh[0]['id']}" if fresh else f"strike {targets[0]['id']} again"
-                self.process.stdin.write(order + "\n")
-                self.process.stdin.flush()
-                if self.wait_for(("read_back", "operator"), after=after)["event"] == "read_back":
-                    after = self.told()
-                    self.process.stdin.write("confirm\n")
-                    self.process.stdin.flush()
-                    answer = self.wait_for(("decided", "operator"), after=after)
-                    if answer["event"] == "decided":
-                        return answer
+                for process in stopped:
+                    process.send_signal(signal.SIGSTOP)
+                self._type("confirm")
+                answer = self.wait_for(("decided", "operator"), after=after)
+                if answer["event"] == "decided":
+                    return answer
+                for process in stopped:
+                    process.send_signal(signal.SIGCONT)
+
+    def _type(self, line):
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
 
     def told(self):
         with self.news:
