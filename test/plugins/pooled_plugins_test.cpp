@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Plugins on a pool of workers, as in the daemon.
+#include <cles/plugin_text.hpp>
+
 #include "plugins/plugin_host.hpp"
 #include "runtime/jobs/pooled_node.hpp"
 
@@ -177,6 +179,25 @@ BOOST_AUTO_TEST_CASE(a_job_binds_by_the_bare_entry_point_and_bad_handles_do_no_h
     car.update("known", 7);
     BOOST_TEST(peer().ask("DELEGATE self:binds") == R"({"value":true})");
     BOOST_TEST(host.figures().answered_twice == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(callbacks_of_a_job_neither_run_beside_its_start_nor_beside_each_other) {
+    load("rough.so");
+    BOOST_TEST(peer().ask("DELEGATE self:takes_turns") == R"({"value":true})");
+}
+
+BOOST_AUTO_TEST_CASE(a_job_learns_which_update_the_value_of_its_feed_is) {
+    load("rough.so");
+    car.update("known", 7);
+    car.update("known", 8);
+    for (const auto* hops : {"[]", "[0]"}) {
+        BOOST_TEST(peer().ask(std::string{"DELEGATE self:marks "} + hops) == "[2,true]");
+    }
+    const auto refused = peer().ask("DELEGATE self:marks [17]");
+    BOOST_TEST(refused.starts_with(R"({"error":"failed")"));
+    BOOST_TEST(refused.find("hops") != std::string::npos, refused);
+    BOOST_TEST(cles::detail::hops_from(CLES_NO_HOPS) == 0U);
+    BOOST_TEST(cles::detail::hops_from(cles::detail::abi_hops(3)) == 3U);
 }
 
 BOOST_AUTO_TEST_CASE(the_systems_nouns_are_pulled_and_bound) {

@@ -27,9 +27,12 @@ struct job_event {
     feed_event kind = feed_event::update;
     std::string_view json = "{}"; ///< of `current` and `update`: an object or an array
     std::string_view publisher{}; ///< the publishing node's name; empty if not known
-    std::uint64_t seq = 0;        ///< of `update`: its sequence number in the noun's publications
-    std::uint64_t missed = 0;     ///< of `gap`: updates that were not received
-    std::string_view text{};      ///< why the publisher was lost, or why the feed has ended
+    /// Of `update`, and of `current` with `bind_options::mark`: its sequence number in the noun's publications; 0 if it
+    /// is not known.
+    std::uint64_t seq = 0;
+    std::uint32_t epoch = 0;  ///< of what has a `seq`: that of the publisher's run, in which it counts
+    std::uint64_t missed = 0; ///< of `gap`: updates that were not received
+    std::string_view text{};  ///< why the publisher was lost, or why the feed has ended
     /// How long it has waited for a worker. Zero in an application.
     std::chrono::nanoseconds waited{0};
 
@@ -99,7 +102,8 @@ class job_feed {
 
     /// Calls back exactly once, never inside this call: with the next event, or with the reason why there is none. That
     /// is the publisher's if it refuses the binding; `cancelled` after `close` and the end of the job; `busy` if the
-    /// last call has not been answered. In a plugin, the callback is a part of the job, and runs on a worker.
+    /// last call has not been answered. In a plugin, the callback is a part of the job, and runs on a worker, after the
+    /// handler and all earlier callbacks of the job have returned.
     /// \throws cles::error with `closed` if it is the feed of no job
     void next(event_callback taken) const;
     /// Unbinds. A call of `next` that has not been answered fails with `cancelled`.

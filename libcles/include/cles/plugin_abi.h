@@ -20,6 +20,10 @@
  *   valid until the process ends, and so does the loaded library.
  * - The handle of a job that has been answered, or that never existed, does no harm: the call does nothing and is
  *   counted. Nor does that of a feed that has ended.
+ * - The code of a job runs in turns: first `start` of its task, then its callbacks of `cles_ask` and `cles_next`, each
+ * after the one before has returned. Only its callback for `on_stop` may run beside them. This holds for an event of a
+ * feed that has ended, too, and for a job that has been answered, with one exception: if a thread of the plugin itself
+ * asks for something then, the callback comes as soon as the host has a thread for it.
  * - No exception may leave a function of the plugin. (The host catches one if the compilers allow it.)
  * - A structure begins with its size as its writer knows it, so that later versions can append members: read none
  *   beyond that size. A change that is not possible in this way changes `abi_major` and the name of the entry point.
@@ -140,6 +144,9 @@ typedef struct cles_callback {
     void* user;
 } cles_callback;
 
+/* For `hops`: the request is not forwarded. */
+#define CLES_NO_HOPS UINT32_MAX
+
 /* Options and callbacks of a request that a job sends. */
 typedef struct cles_ask {
     uint32_t size;       /* of this structure */
@@ -157,6 +164,9 @@ typedef struct cles_ask {
     /* Null, or called for each report of a DELEGATE's progress before it is answered: a fraction from 0 to 1. */
     void (*progress)(void* user, double fraction, cles_text json);
     void* user;
+    /* Since 1.7; an older host ignores it. How many nodes may forward the request, 16 at most. 0: 8. */
+    uint32_t hops;
+    uint32_t reserved;
 } cles_ask;
 
 /* Since 1.7: a feed of a job. Never 0, and not reused while the process runs. */
@@ -175,10 +185,12 @@ typedef struct cles_event {
     uint32_t kind;
     cles_text json;      /* of CURRENT and UPDATE: valid JSON, an object or an array; otherwise {} */
     cles_text publisher; /* the publishing node's name; empty if not known */
-    uint64_t seq;        /* of UPDATE: its sequence number */
+    uint64_t seq;        /* of UPDATE, and of CURRENT with `cles_bind.mark`: its sequence number; 0 if not known */
     uint64_t missed;     /* of GAP */
     cles_text text;      /* of LOST */
     int64_t waited_ns;   /* for a worker, since the job could have had it */
+    uint32_t epoch;      /* of what has a `seq`: that of the publisher's run, in which it counts */
+    uint32_t reserved;
 } cles_event;
 
 /* How a job binds. */
@@ -190,6 +202,8 @@ typedef struct cles_bind {
     int64_t every_ms;    /* the minimum interval between updates; the newest is sent. 0: every update */
     int64_t deadline_ms; /* for the publisher's reply; 0: 5 s */
     cles_text at;        /* the URL to send it to, instead of looking up the name; may be empty */
+    uint32_t hops;       /* how many nodes may forward it, 16 at most. 0: 8 */
+    uint32_t mark;       /* 1: CURRENT tells which update it is, if the publisher knows: `seq` and `epoch` */
 } cles_bind;
 
 /* Receives the next event of a feed. */
@@ -197,10 +211,10 @@ typedef struct cles_next {
     uint32_t size; /* of this structure */
     uint32_t reserved;
     /*
-     * Called once, on a thread of the host, and never inside `next`; after `start` of the job and all its earlier
-     * callbacks have returned. `code` is empty if there is an event. Otherwise the feed has ended, `event` is null,
-     * and `code` is the error's name on the wire, with a message: the publisher's, or "cancelled" after `unbind` and
-     * the end of the job.
+     * Called once, on a thread of the host, and never inside `next`, but in a turn of the job: after `start` and all
+     * its earlier callbacks have returned. `code` is empty if there is an event. Otherwise the feed has ended, `event`
+     * is null, and `code` is the error's name on the wire, with a message: the publisher's, or "cancelled" after
+     * `unbind` and the end of the job.
      */
     void (*event)(void* user, cles_text code, cles_text message, const cles_event* event);
     void* user;

@@ -100,7 +100,9 @@ class plugin_call final : public call_control {
                                 .at = abi_text(options.at_),
                                 .answered = &asked::answer,
                                 .progress = options.on_progress_ ? &asked::report : nullptr,
-                                .user = owned.get()};
+                                .user = owned.get(),
+                                .hops = abi_hops(options.hops_),
+                                .reserved = 0};
         static_cast<void>(owned.release()); // freed by `answer`, which may run before `delegate` returns
         host_.delegate(&host_, job_, abi_text(command), &crossing);
     }
@@ -121,7 +123,9 @@ class plugin_call final : public call_control {
                                  .keep = options.keep_,
                                  .every_ms = options.every_.count(),
                                  .deadline_ms = options.deadline_.count(),
-                                 .at = abi_text(options.at_)};
+                                 .at = abi_text(options.at_),
+                                 .hops = abi_hops(options.hops_),
+                                 .mark = options.mark_ ? 1U : 0U};
         return std::make_shared<plugin_feed>(host_, job_, host_.bind(&host_, job_, abi_text(noun), &crossing));
     }
 
@@ -171,6 +175,7 @@ struct plugin_feed::awaited {
                              .json = view_of(what.json),
                              .publisher = view_of(what.publisher),
                              .seq = what.seq,
+                             .epoch = what.epoch,
                              .missed = what.missed,
                              .text = view_of(what.text),
                              .waited = std::chrono::nanoseconds{what.waited_ns}});

@@ -103,6 +103,7 @@ class service_job_feed final : public job_feed_control, public std::enable_share
                              .json = event.body,
                              .publisher = event.publisher,
                              .seq = event.seq,
+                             .epoch = event.epoch,
                              .missed = event.missed,
                              .text = event.text});
             return true;

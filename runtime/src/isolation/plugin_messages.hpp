@@ -99,8 +99,9 @@ struct bind_message {
     std::int64_t every_ms = 0;
     std::uint32_t hops = 8;
     std::int64_t deadline_ms = 0;
+    bool mark = false;
 };
-BOOST_DESCRIBE_STRUCT(bind_message, (), (noun, at, keep, every_ms, hops, deadline_ms))
+BOOST_DESCRIBE_STRUCT(bind_message, (), (noun, at, keep, every_ms, hops, deadline_ms, mark))
 
 /// The kinds of events in lines, in the order of `feed_event`.
 inline constexpr std::array<std::string_view, 5> event_names{"current", "update", "gap", "lost", "rebound"};

@@ -204,13 +204,7 @@ class plugin_runner {
             }
             std::string reply;
             if (read->task == control_task) {
-                try {
-                    jobs_.resume(*read);
-                } catch (const std::exception& e) {
-                    daemon_.log(log_level::error, std::string{"a callback threw: "} + e.what());
-                } catch (...) {
-                    daemon_.log(log_level::error, "a callback threw");
-                }
+                jobs_.resume(*read, *line);
                 reply = "id=1 {}\n";
             } else {
                 reply = jobs_.serve(*read, wanted_.node);

@@ -256,11 +256,18 @@ void plugin_session::stop(std::uint64_t id) {
     say(wire_line_writer{verb::push, control_task}.parameter("cancel").parameter(id).adverb("reply", "no").body("{}"));
 }
 
-// Runs a callback of a job that has started. Called on a worker, as a part of the job.
-void plugin_session::resume(const std::shared_ptr<job>& by, std::string_view line) {
-    // Nobody blames it for the time that it has waited.
-    by->due = std::max(by->due.load(), clock::now());
+// Runs a callback of a job that has started. Called on a worker, as a part of the job. \param since when it has waited
+void plugin_session::resume(const std::shared_ptr<job>& by, std::string_view line, time_point since) {
+    const auto now = clock::now();
+    auto due = by->due.load();
+    // Nobody blames it for the time that it has waited for others, or for a worker. But if it asks for one thing after
+    // another when it should have ended, these short waits are its own.
+    const auto waited = now - std::max(since, due);
+    if (waited > 0ns && (since <= due || waited > watch_interval(options_.grace))) {
+        by->due.compare_exchange_strong(due, std::min(due + waited, now)); // fails if it is stopped meanwhile
+    }
     --by->waits;
+    kill_if_overdue(*by, now);
     auto* on = take_lane(by);
     if (on == nullptr) {
         return; // the job has been answered
@@ -462,22 +469,22 @@ void plugin_session::kill_if_overdue() {
     if (now - control_closed_ > end_time) {
         kill("it closed a connection");
     }
-    const auto patience = patience_of(options_.grace);
-    const auto check = [&](const job& of) {
-        if (now - of.due.load() > patience) {
-            kill(of.label + " did not end within " + grace_text(options_.grace) + " of its deadline or cancellation");
-        }
-    };
     const std::scoped_lock lock{mutex_};
     for (const auto& each : lanes_) {
         if (each.used_by) {
-            check(*each.used_by);
+            kill_if_overdue(*each.used_by, now);
         }
     }
     for (const auto& [id, each] : jobs_) {
         if (!each->on_lane && each->waits == 0) {
-            check(*each);
+            kill_if_overdue(*each, now);
         }
+    }
+}
+
+void plugin_session::kill_if_overdue(const job& of, time_point now) {
+    if (now - of.due.load() > patience_of(options_.grace)) {
+        kill(of.label + " did not end within " + grace_text(options_.grace) + " of its deadline or cancellation");
     }
 }
 
@@ -583,6 +590,23 @@ std::string_view wire_name_of(boost::system::error_code code) noexcept {
     return wire_name(code == errc::stopped ? errc::unavailable : ours ? static_cast<errc>(code.value()) : errc::failed);
 }
 
+// What answers a `next`.
+std::string event_line(std::uint64_t ticket, boost::system::error_code code, const job_event& what) {
+    wire_line_writer line{verb::push, control_task};
+    line.parameter("answered").parameter(ticket);
+    if (code) {
+        line.adverb("code", wire_name_of(code));
+    } else {
+        line.adverb("event", event_names[static_cast<std::size_t>(what.kind)]);
+        line.adverb("publisher", what.publisher);
+        line.adverb("seq", static_cast<std::int64_t>(what.seq))
+            .adverb("epoch", std::int64_t{what.epoch})
+            .adverb("missed", static_cast<std::int64_t>(what.missed));
+        line.adverb("waited", std::int64_t{what.waited.count()});
+    }
+    return line.adverb("message", what.text).body(what.json);
+}
+
 template <class T>
 T body_of(const wire_line& line) {
     T read{};
@@ -627,9 +651,10 @@ void plugin_session::on_request(const wire_line& line) {
 void plugin_session::ask(const wire_line& line) {
     const auto ticket = line.number_at(2);
     const auto wanted = body_of<ask_message>(line);
-    const auto answered = [weak = weak_from_this(), ticket](const std::shared_ptr<job>& by,
-                                                            boost::system::error_code code, std::string_view json,
-                                                            std::string_view message) {
+    const auto since = clock::now();
+    const auto answered = [weak = weak_from_this(), ticket, since](const std::shared_ptr<job>& by,
+                                                                   boost::system::error_code code,
+                                                                   std::string_view json, std::string_view message) {
         const auto self = weak.lock();
         if (!self) {
             return;
@@ -640,7 +665,7 @@ void plugin_session::ask(const wire_line& line) {
             reply.adverb("code", wire_name_of(code)).adverb("message", message);
         }
         const auto text = reply.body(json.empty() ? std::string_view{"{}"} : json);
-        by ? self->resume(by, text) : self->say(text);
+        by ? self->resume(by, text, since) : self->say(text);
     };
     const auto by = find(line.number_at(1));
     if (!by) {
@@ -655,13 +680,15 @@ void plugin_session::ask(const wire_line& line) {
     options.urgent(wanted.urgent).at(wanted.at).hops(wanted.hops);
     options.deadline(std::chrono::milliseconds{wanted.deadline_ms});
     if (wanted.progress) {
-        options.on_progress([weak = weak_from_this(), by, ticket](double fraction, std::string_view json) {
+        options.on_progress([weak = weak_from_this(), by, ticket, since](double fraction, std::string_view json) {
             if (const auto self = weak.lock()) {
-                self->resume(by, wire_line_writer{verb::push, control_task}
-                                     .parameter("reported")
-                                     .parameter(ticket)
-                                     .adverb("progress", to_json(fraction))
-                                     .body(json));
+                self->resume(by,
+                             wire_line_writer{verb::push, control_task}
+                                 .parameter("reported")
+                                 .parameter(ticket)
+                                 .adverb("progress", to_json(fraction))
+                                 .body(json),
+                             since);
                 ++by->waits;
             }
         });
@@ -695,7 +722,7 @@ void plugin_session::bind(const wire_line& line) {
     }
     bind_options options;
     options.at(wanted.at).keep(wanted.keep).every(std::chrono::milliseconds{wanted.every_ms});
-    options.deadline(std::chrono::milliseconds{wanted.deadline_ms}).hops(wanted.hops);
+    options.deadline(std::chrono::milliseconds{wanted.deadline_ms}).hops(wanted.hops).mark(wanted.mark);
     by->feeds.insert_or_assign(line.number_at(2), by->answer.bind(wanted.noun, options));
 }
 
@@ -709,16 +736,17 @@ void plugin_session::next(const wire_line& line) {
         feed = found == by->feeds.end() ? job_feed{} : found->second;
     }
     if (!feed.is_open()) {
-        tell(nullptr, ticket, errc::cancelled, {.text = "the feed is closed"});
+        say(event_line(ticket, errc::cancelled, {.text = "the feed is closed"}));
         return;
     }
     if (!begin_wait(*by)) {
-        tell(nullptr, ticket, errc::busy, {.text = "too many requests at once"});
+        say(event_line(ticket, errc::busy, {.text = "too many requests at once"}));
         return;
     }
-    feed.next([weak = weak_from_this(), by, ticket](boost::system::error_code code, const job_event& what) {
+    feed.next([weak = weak_from_this(), by, ticket, since = clock::now()](boost::system::error_code code,
+                                                                          const job_event& what) {
         if (const auto self = weak.lock()) {
-            self->tell(by, ticket, code, what);
+            self->resume(by, event_line(ticket, code, what), since);
             --self->asks_;
         }
     });
@@ -728,24 +756,6 @@ void plugin_session::unbind(const wire_line& line) {
     if (const auto by = find(line.number_at(1))) {
         by->feeds.erase(line.number_at(2));
     }
-}
-
-// \param by continues on this worker; null: it has not waited
-void plugin_session::tell(const std::shared_ptr<job>& by, std::uint64_t ticket, boost::system::error_code code,
-                          const job_event& what) {
-    wire_line_writer line{verb::push, control_task};
-    line.parameter("answered").parameter(ticket);
-    if (code) {
-        line.adverb("code", wire_name_of(code));
-    } else {
-        line.adverb("event", event_names[static_cast<std::size_t>(what.kind)]);
-        line.adverb("publisher", what.publisher);
-        line.adverb("seq", static_cast<std::int64_t>(what.seq))
-            .adverb("missed", static_cast<std::int64_t>(what.missed));
-        line.adverb("waited", std::int64_t{what.waited.count()});
-    }
-    const auto text = line.adverb("message", what.text).body(what.json);
-    by ? resume(by, text) : say(text);
 }
 
 // -- the end -------------------------------------------------------------------------------------------------------

@@ -122,7 +122,7 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
     void settle(const job& of, std::string_view body);
     void fail(const job& of);
     void stop(std::uint64_t id);
-    void resume(const std::shared_ptr<job>& by, std::string_view line);
+    void resume(const std::shared_ptr<job>& by, std::string_view line, time_point since);
 
     // Says something on the control connection.
     void say(std::string_view lines);
@@ -134,6 +134,7 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
     void wait_for_end();
     void watch_jobs();
     void kill_if_overdue();
+    void kill_if_overdue(const job& of, time_point now);
     bool read_until(std::chrono::steady_clock::time_point until, const std::function<bool()>& done);
     void read_rest();
     bool read_control();
@@ -146,8 +147,6 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
     void next(const wire_line& line);
     void unbind(const wire_line& line);
     bool begin_wait(job& by);
-    void tell(const std::shared_ptr<job>& by, std::uint64_t ticket, boost::system::error_code code,
-              const job_event& what);
     void finish();
 
     boost::asio::any_io_executor executor_;

@@ -74,7 +74,7 @@ class process_jobs::feed final : public detail::job_feed_control {
         : jobs_(jobs), job_(job), number_(number) {}
 
     void next(event_callback taken) override {
-        const auto ticket = jobs_.add_request({.answered = {}, .event = std::move(taken)});
+        const auto ticket = jobs_.add_request({.job = job_, .answered = {}, .event = std::move(taken)});
         jobs_.daemon_.say(line("next").parameter(ticket).body("{}"));
     }
     void close() noexcept override { jobs_.daemon_.say(line("unbind").body("{}")); }
@@ -137,7 +137,8 @@ class process_jobs::call final : public detail::call_control {
     void on_stop(std::function<void()> callback) override { on_stop_.set(std::move(callback)); }
     [[nodiscard]] bool stopped() const noexcept override { return on_stop_.stopped(); }
     void delegate(std::string_view command, const call_options& options, answer_callback answered) override {
-        const auto ticket = jobs_.add_request({.answered = std::move(answered), .progress = options.on_progress_});
+        const auto ticket =
+            jobs_.add_request({.job = id_, .answered = std::move(answered), .progress = options.on_progress_});
         const ask_message wanted{.command = std::string{command},
                                  .at = options.at_,
                                  .urgent = options.urgent_,
@@ -161,7 +162,8 @@ class process_jobs::call final : public detail::call_control {
                                   .keep = options.keep_,
                                   .every_ms = options.every_.count(),
                                   .hops = options.hops_,
-                                  .deadline_ms = options.deadline_.count()};
+                                  .deadline_ms = options.deadline_.count(),
+                                  .mark = options.mark_};
         jobs_.daemon_.say(made->line("bind").body(wanted));
         return made;
     }
@@ -232,6 +234,7 @@ std::string process_jobs::serve(const wire_line& line, std::string_view node) {
     {
         const std::scoped_lock lock{mutex_};
         calls_.emplace(line.id, handled.get());
+        turns_.try_emplace(line.id);
         if (std::erase(cancelled_early_, line.id) != 0) {
             handled->stop();
         }
@@ -262,12 +265,12 @@ std::string process_jobs::serve(const wire_line& line, std::string_view node) {
         detail::fail_with(*handled, std::current_exception());
     }
     const auto direct = handled->end();
+    end_turn(line.id);
     wire_line_writer reply{line.id};
     return direct ? reply.body(*direct) : reply.adverb("later", "yes").body("{}");
 }
 
-void process_jobs::resume(const wire_line& line) {
-    const bool reported = line.parameters.front() == "reported";
+void process_jobs::resume(const wire_line& line, std::string_view text) {
     std::shared_ptr<asked> request;
     {
         const std::scoped_lock lock{mutex_};
@@ -276,34 +279,75 @@ void process_jobs::resume(const wire_line& line) {
             return;
         }
         request = found->second;
-        if (!reported) {
+        if (line.parameters.front() != "reported") {
             requests_.erase(found);
         }
+        const auto [turn, is_first] = turns_.try_emplace(request->job);
+        if (!is_first) { // what is read from a line are views of it, so it is read again then
+            turn->second.emplace_back(
+                [this, request, kept = std::string{text}] { deliver(*request, read_wire_line(kept).value()); });
+            return;
+        }
     }
-    if (reported) {
+    deliver(*request, line);
+    end_turn(request->job);
+}
+
+// The job's code has returned.
+void process_jobs::end_turn(std::uint64_t job) {
+    for (;;) {
+        std::vector<std::function<void()>> next;
+        {
+            const std::scoped_lock lock{mutex_};
+            const auto turn = turns_.find(job);
+            next.swap(turn->second);
+            if (next.empty()) {
+                turns_.erase(turn);
+                return;
+            }
+        }
+        for (const auto& each : next) {
+            each();
+        }
+    }
+}
+
+void process_jobs::deliver(const asked& request, const wire_line& line) {
+    try {
+        run_callback(request, line);
+    } catch (const std::exception& e) {
+        daemon_.log(log_level::error, std::string{"a callback threw: "} + e.what());
+    } catch (...) {
+        daemon_.log(log_level::error, "a callback threw");
+    }
+}
+
+void process_jobs::run_callback(const asked& request, const wire_line& line) {
+    if (line.parameters.front() == "reported") {
         double fraction = 0;
-        if (request->progress && json_reader{line.adverb("progress")}.read(fraction)) {
-            request->progress(fraction, line.body);
+        if (request.progress && json_reader{line.adverb("progress")}.read(fraction)) {
+            request.progress(fraction, line.body);
         }
         return;
     }
     const auto name = line.adverb("code");
     const auto code = name.empty() ? boost::system::error_code{} : errc_from_wire(name);
-    if (!request->event) {
-        request->answered(code, line.body, line.adverb("message"));
+    if (!request.event) {
+        request.answered(code, line.body, line.adverb("message"));
         return;
     }
     const auto kind = std::ranges::find(event_names, line.adverb("event")) - event_names.begin();
     const auto number = [&line](std::string_view key) {
         return static_cast<std::uint64_t>(line.number(key).value_or(0));
     };
-    request->event(code, {.kind = code ? feed_event::lost : static_cast<feed_event>(kind),
-                          .json = line.body,
-                          .publisher = line.adverb("publisher"),
-                          .seq = number("seq"),
-                          .missed = number("missed"),
-                          .text = line.adverb("message"),
-                          .waited = std::chrono::nanoseconds{line.number("waited").value_or(0)}});
+    request.event(code, {.kind = code ? feed_event::lost : static_cast<feed_event>(kind),
+                         .json = line.body,
+                         .publisher = line.adverb("publisher"),
+                         .seq = number("seq"),
+                         .epoch = static_cast<std::uint32_t>(number("epoch")),
+                         .missed = number("missed"),
+                         .text = line.adverb("message"),
+                         .waited = std::chrono::nanoseconds{line.number("waited").value_or(0)}});
 }
 
 // -- from the control connection -----------------------------------------------------------------------------------
@@ -336,8 +380,8 @@ void process_jobs::progress_unwanted(std::uint64_t id) {
 }
 
 void process_jobs::resume_on_notifier(std::string_view line) {
-    // What is read from a line are views of it, so it is read again there.
-    notifier_.notify({.callback = [this, kept = std::string{line}] { resume(read_wire_line(kept).value()); }});
+    // As above.
+    notifier_.notify({.callback = [this, kept = std::string{line}] { resume(read_wire_line(kept).value(), kept); }});
 }
 
 } // namespace cles::runtime

@@ -22,6 +22,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 namespace cles::runtime {
 
@@ -61,8 +62,8 @@ class process_jobs {
     /// The job whose handler runs on this thread, if it is traced; else 0.
     [[nodiscard]] static std::uint64_t traced_here() noexcept;
     /// Runs a callback of a job: a request that it has sent is answered or reports progress, or there is an event of a
-    /// feed.
-    void resume(const wire_line& line);
+    /// feed. If other code of the job runs meanwhile, the callback runs after that, on its thread. \param text the line
+    void resume(const wire_line& line, std::string_view text);
 
     // From the control connection:
     void cancel(std::uint64_t id);
@@ -74,18 +75,24 @@ class process_jobs {
     class call;
     class feed;
     struct asked {
+        std::uint64_t job;
         answer_callback answered;
         std::function<void(double, std::string_view)> progress{};
         event_callback event{}; ///< instead of `answered`
     };
 
     std::uint64_t add_request(asked what);
+    void deliver(const asked& request, const wire_line& line);
+    static void run_callback(const asked& request, const wire_line& line);
+    void end_turn(std::uint64_t job);
 
     control_connection& daemon_;
     std::map<std::pair<verb, std::string>, async_handler, std::less<>> tasks_;
     stop_notifier notifier_;
     std::mutex mutex_; // of all that follows
     boost::unordered_flat_map<std::uint64_t, call*> calls_;
+    // The jobs whose code runs, and what they get afterwards.
+    boost::unordered_flat_map<std::uint64_t, std::vector<std::function<void()>>> turns_;
     boost::unordered_flat_map<std::uint64_t, std::shared_ptr<asked>> requests_;
     std::uint64_t last_ticket_ = 0;
     std::uint64_t last_feed_ = 0;

@@ -315,6 +315,7 @@ void loaded_plugin::run(task_handler handler, void* user, const request& what, c
             }
         });
     }
+    const plugin_turn turn{job};
     call_handler(handler, user, what, job);
     jobs_.started(job);
 }
@@ -359,8 +360,8 @@ void loaded_plugin::call_handler(task_handler handler, void* user, const request
 
 void loaded_plugin::delegate(plugin_jobs::id job, std::string_view command, const cles_ask& ask) {
     const auto request = std::make_shared<plugin_request>(
-        ask, [this](std::function<void()> answer) { call_on_other_thread(std::move(answer)); });
-    auto options = call_options{}.urgent(ask.urgent != 0).at(view_of(ask.at));
+        ask, job, [this, job](std::function<void()> answer) { call_after(job, std::move(answer)); });
+    auto options = call_options{}.urgent(ask.urgent != 0).at(view_of(ask.at)).hops(detail::hops_from(ask.hops));
     if (ask.deadline_ms > 0) {
         options.deadline(std::chrono::milliseconds{ask.deadline_ms});
     }
@@ -387,20 +388,23 @@ plugin_feeds::id loaded_plugin::bind(plugin_jobs::id job, std::string_view noun,
     if (!by) {
         const bool runs_inline = !jobs_.stopped(job);
         return feeds_.add({.feed = {},
+                           .job = job,
                            .why = runs_inline ? errc::failed : errc::cancelled,
                            .words = runs_inline ? "a job on the I/O thread has no feeds"
                                                 : "the requester of the job no longer waits"});
     }
     bind_options options;
     options.at(view_of(how.at)).keep(how.keep).every(std::chrono::milliseconds{how.every_ms});
-    options.deadline(std::chrono::milliseconds{how.deadline_ms});
-    return feeds_.add({.feed = by->bind(noun, options)});
+    options.deadline(std::chrono::milliseconds{how.deadline_ms}).hops(detail::hops_from(how.hops)).mark(how.mark != 0);
+    return feeds_.add({.feed = by->bind(noun, options), .job = job});
 }
 
 void loaded_plugin::next(plugin_feeds::id feed, const cles_next& wanted) {
-    const auto waiting = std::make_shared<plugin_next>(
-        wanted, [this](std::function<void()> answer) { call_on_other_thread(std::move(answer)); });
     const auto found = feeds_.find(feed);
+    // Whose feed it was is not known any more, but only the job itself has the handle.
+    const auto job = found.job == 0 && feeds_.has_existed(feed) ? plugin_turn::current_job() : found.job;
+    const auto waiting = std::make_shared<plugin_next>(
+        wanted, job, [this, job](std::function<void()> answer) { call_after(job, std::move(answer)); });
     if (found.feed.is_open()) {
         found.feed.next([this, feed, waiting](boost::system::error_code code, const job_event& what) {
             if (code && code != errc::busy) {
@@ -413,6 +417,15 @@ void loaded_plugin::next(plugin_feeds::id feed, const cles_next& wanted) {
         waiting->complete(found.why, {.text = found.words});
     }
     waiting->sent();
+}
+
+// Not beside the job's other code.
+void loaded_plugin::call_after(plugin_jobs::id job, std::function<void()> callback) {
+    if (job != 0 && job == plugin_turn::current_job()) {
+        plugin_turn::call_at_end(std::move(callback));
+    } else {
+        call_on_other_thread(std::move(callback));
+    }
 }
 
 // Not here, because the plugin's code may take long, or wait for a lock that this thread holds.

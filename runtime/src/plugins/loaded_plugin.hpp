@@ -82,6 +82,7 @@ class loaded_plugin {
     void delegate(plugin_jobs::id job, std::string_view command, const cles_ask& ask);
     plugin_feeds::id bind(plugin_jobs::id job, std::string_view noun, const cles_bind& how);
     void next(plugin_feeds::id feed, const cles_next& wanted);
+    void call_after(plugin_jobs::id job, std::function<void()> callback);
     void call_on_other_thread(std::function<void()> callback);
     void log(log_level level, std::string_view text) const;
 

@@ -20,6 +20,11 @@ plugin_feeds::entry plugin_feeds::find(id feed) const {
     return found == all_.end() ? entry{} : found->second;
 }
 
+bool plugin_feeds::has_existed(id feed) const {
+    const std::scoped_lock lock{mutex_};
+    return feed != 0 && feed <= last_;
+}
+
 void plugin_feeds::remove(id feed) {
     entry gone; // destroyed without the lock
     const std::scoped_lock lock{mutex_};

@@ -4,6 +4,8 @@
 #include <cles/error.hpp>
 #include <cles/job_feed.hpp>
 
+#include "plugins/plugin_jobs.hpp"
+
 #include <boost/unordered/unordered_flat_map.hpp>
 
 #include <cstddef>
@@ -23,6 +25,7 @@ class plugin_feeds {
     /// A feed, or why it cannot be read.
     struct entry {
         job_feed feed{};
+        plugin_jobs::id job = 0; ///< 0: it is not known any more
         errc why = errc::cancelled;
         const char* words = "the feed is closed";
     };
@@ -31,6 +34,8 @@ class plugin_feeds {
     id add(entry what);
     /// The feed; an entry without one if there is none.
     [[nodiscard]] entry find(id feed) const;
+    /// Whether there has ever been one with that handle.
+    [[nodiscard]] bool has_existed(id feed) const;
     /// Forgets a feed, which unbinds it.
     void remove(id feed);
 

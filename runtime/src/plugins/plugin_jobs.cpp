@@ -31,6 +31,8 @@ void call_plugin(void (*function)(Parameters...), Arguments... arguments) noexce
     }
 }
 
+thread_local plugin_turn* current_turn = nullptr;
+
 constexpr std::string_view node_has_stopped = "the node has stopped";
 
 // The error's name on the wire; empty on success.
@@ -231,6 +233,23 @@ std::uint64_t plugin_jobs::unknown_answers() const {
     return unknown_answers_;
 }
 
+// -- turns ---------------------------------------------------------------------------------------------------------
+
+plugin_turn::plugin_turn(plugin_jobs::id job) noexcept : job_(job), outer_(std::exchange(current_turn, this)) {}
+
+plugin_turn::~plugin_turn() {
+    while (!waiting_.empty()) {
+        for (const auto& each : std::exchange(waiting_, {})) {
+            each();
+        }
+    }
+    current_turn = outer_;
+}
+
+plugin_jobs::id plugin_turn::current_job() noexcept { return current_turn == nullptr ? 0 : current_turn->job_; }
+
+void plugin_turn::call_at_end(std::function<void()> what) { current_turn->waiting_.push_back(std::move(what)); }
+
 // -- what jobs wait for --------------------------------------------------------------------------------------------
 
 plugin_request::~plugin_request() { complete(errc::unavailable, "{}", node_has_stopped); }
@@ -251,11 +270,13 @@ void plugin_request::complete(boost::system::error_code code, std::string_view j
         }
     } catch (...) { // no memory or no thread: better now than never
     }
+    const plugin_turn turn{job()};
     call_plugin(answered_, user_, abi_text(name), abi_text(result), abi_text(message));
 }
 
 void plugin_request::report_progress(double fraction, std::string_view json) noexcept {
     if (!is_claimed()) {
+        const plugin_turn turn{job()};
         call_plugin(progress_, user_, fraction, abi_text(json));
     }
 }
@@ -274,7 +295,10 @@ void plugin_next::complete(boost::system::error_code code, const job_event& what
                                .seq = what.seq,
                                .missed = what.missed,
                                .text = abi_text(what.text),
-                               .waited_ns = what.waited.count()};
+                               .waited_ns = what.waited.count(),
+                               .epoch = what.epoch,
+                               .reserved = 0};
+        const plugin_turn turn{job()};
         call_plugin(event_, user_, cles_text{}, cles_text{}, &event);
         return;
     }
@@ -288,6 +312,7 @@ void plugin_next::complete(boost::system::error_code code, const job_event& what
         }
     } catch (...) { // as above
     }
+    const plugin_turn turn{job()};
     call_plugin(event_, user_, abi_text(name), abi_text(what.text), nullptr);
 }
 

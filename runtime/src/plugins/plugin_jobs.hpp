@@ -91,11 +91,32 @@ class plugin_jobs {
     bool closed_ = false;
 };
 
+/// The time in which the plugin's code for a job runs on this thread: `start`, or a callback. What the job may only get
+/// afterwards waits for the end of the turn.
+class plugin_turn {
+  public:
+    explicit plugin_turn(plugin_jobs::id job) noexcept;
+    plugin_turn(const plugin_turn&) = delete;
+    plugin_turn& operator=(const plugin_turn&) = delete;
+    /// Calls what waits, as parts of this turn.
+    ~plugin_turn();
+
+    /// The job of this thread's turn; 0: none.
+    [[nodiscard]] static plugin_jobs::id current_job() noexcept;
+    /// Calls it at the end of this thread's turn. \pre it has one
+    static void call_at_end(std::function<void()> what);
+
+  private:
+    plugin_jobs::id job_;
+    plugin_turn* outer_;
+    std::vector<std::function<void()>> waiting_;
+};
+
 /// Something that a plugin's job waits for. The plugin gets it exactly once, even if it never arrives, and never during
 /// the call that begins the wait.
 class plugin_wait {
   public:
-    /// Calls a function soon, on another thread.
+    /// Calls a function later: as a part of the job, or on another thread.
     using deferred_call = std::function<void(std::function<void()>)>;
 
     plugin_wait(const plugin_wait&) = delete;
@@ -105,8 +126,8 @@ class plugin_wait {
     void sent() noexcept { sending_thread_ = std::thread::id{}; }
 
   protected:
-    explicit plugin_wait(deferred_call call_later)
-        : call_later_(std::move(call_later)), sending_thread_(std::this_thread::get_id()) {}
+    plugin_wait(plugin_jobs::id job, deferred_call call_later)
+        : job_(job), call_later_(std::move(call_later)), sending_thread_(std::this_thread::get_id()) {}
     ~plugin_wait() = default;
 
     /// Whether this is the first result.
@@ -115,8 +136,11 @@ class plugin_wait {
     /// Whether this thread is in the call that begins the wait, so that it must not deliver the result.
     [[nodiscard]] bool is_sending() const noexcept { return sending_thread_.load() == std::this_thread::get_id(); }
     void defer(std::function<void()> deliver) const { call_later_(std::move(deliver)); }
+    /// That waits; 0: it has ended, or never existed.
+    [[nodiscard]] plugin_jobs::id job() const noexcept { return job_; }
 
   private:
+    const plugin_jobs::id job_;
     deferred_call call_later_;
     std::atomic<std::thread::id> sending_thread_;
     std::atomic<bool> claimed_{false};
@@ -125,8 +149,8 @@ class plugin_wait {
 /// A request that a plugin's job has sent.
 class plugin_request final : public plugin_wait {
   public:
-    plugin_request(const cles_ask& ask, deferred_call call_later)
-        : plugin_wait(std::move(call_later)), answered_(ask.answered), progress_(ask.progress), user_(ask.user) {}
+    plugin_request(const cles_ask& ask, plugin_jobs::id job, deferred_call call_later)
+        : plugin_wait(job, std::move(call_later)), answered_(ask.answered), progress_(ask.progress), user_(ask.user) {}
     ~plugin_request();
 
     void complete(boost::system::error_code code, std::string_view json, std::string_view message) noexcept;
@@ -141,8 +165,8 @@ class plugin_request final : public plugin_wait {
 /// The next event of a feed, for which a plugin's job has asked.
 class plugin_next final : public plugin_wait {
   public:
-    plugin_next(const cles_next& next, deferred_call call_later)
-        : plugin_wait(std::move(call_later)), event_(next.event), user_(next.user) {}
+    plugin_next(const cles_next& next, plugin_jobs::id job, deferred_call call_later)
+        : plugin_wait(job, std::move(call_later)), event_(next.event), user_(next.user) {}
     ~plugin_next();
 
     /// \param what if `code` is set, the reason is its text

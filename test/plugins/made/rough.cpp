@@ -3,6 +3,7 @@
 #include <cles/plugin_abi.h>
 
 #include <atomic>
+#include <chrono>
 #include <condition_variable>
 #include <cstring>
 #include <mutex>
@@ -86,6 +87,72 @@ void binds(void*, cles_job job, const cles_request*) {
         the_host->done(the_host, current, text(good ? "true" : "false"));
     };
     feed = the_host->bind(the_host, job, text("self:known"), &how);
+    the_host->next(the_host, feed, &next);
+}
+
+// Asks for events of a feed that has ended, in its handler and in a callback, neither of which returns at once. The
+// second callback tells whether two of them have run at the same time.
+struct {
+    cles_job job;
+    cles_feed feed;
+    std::atomic<int> calls, running;
+    std::atomic<bool> overlap;
+} in_turns;
+
+void ask_in_turn();
+
+void come_in_turn(void*, cles_text, cles_text, const cles_event*) {
+    in_turns.overlap = in_turns.overlap || ++in_turns.running != 1;
+    if (++in_turns.calls == 1) {
+        ask_in_turn();
+    } else {
+        the_host->done(the_host, in_turns.job, text(in_turns.overlap ? "false" : "true"));
+    }
+    --in_turns.running;
+}
+
+void ask_in_turn() {
+    cles_next next{};
+    next.size = sizeof next;
+    next.event = come_in_turn;
+    const int before = in_turns.calls;
+    the_host->next(the_host, in_turns.feed, &next);
+    for (int i = 0; i < 20 && in_turns.calls == before; ++i) { // where it must not come
+        std::this_thread::sleep_for(std::chrono::milliseconds{1});
+    }
+}
+
+void takes_turns(void*, cles_job job, const cles_request*) {
+    in_turns.running = 1;
+    cles_bind how{};
+    how.size = sizeof how;
+    in_turns.job = job;
+    in_turns.feed = the_host->bind(the_host, job, text("self:known"), &how);
+    the_host->unbind(the_host, in_turns.feed);
+    ask_in_turn();
+    --in_turns.running;
+}
+
+// Which update the value of the feed is; or why there is none. Its body is the number of hops, of which 0 are written
+// so.
+void marks(void*, cles_job job, const cles_request* asked) {
+    static cles_job current;
+    current = job;
+    cles_bind how{};
+    how.size = sizeof how;
+    how.mark = 1;
+    how.hops = string(asked->body) == "[0]" ? CLES_NO_HOPS : string(asked->body) == "[17]" ? 17 : 0;
+    const auto feed = the_host->bind(the_host, job, text("self:known"), &how);
+    cles_next next{};
+    next.size = sizeof next;
+    next.event = [](void*, cles_text code, cles_text message, const cles_event* event) {
+        if (code.size != 0) {
+            the_host->fail(the_host, current, code, message);
+            return;
+        }
+        const auto told = "[" + std::to_string(event->seq) + "," + (event->epoch != 0 ? "true" : "false") + "]";
+        the_host->done(the_host, current, {told.data(), told.size()});
+    };
     the_host->next(the_host, feed, &next);
 }
 
@@ -204,6 +271,8 @@ int32_t start(const cles_host* host, cles_text) {
     add(host, "twice_elsewhere", twice_elsewhere);
     add(host, "invented", invented);
     add(host, "binds", binds);
+    add(host, "takes_turns", takes_turns);
+    add(host, "marks", marks);
     add(host, "throws", throws);
     add(host, "throws_anything", throws_anything);
     add(host, "no_json", no_json);

@@ -212,6 +212,13 @@ class Ends(Isolated):
                   "was ended because DELEGATE 'hoards' did not end within 400 ms of its deadline or cancellation",
                   own=False, code="deadline")
 
+    def test_a_job_that_asks_for_events_for_ever_does_not_end(self):
+        for task in ("insists", "persists"):
+            with self.subTest(task):
+                self.ends(f"DELEGATE self:{task} {SHORT}",
+                          f"was ended because DELEGATE '{task}' did not end within 400 ms of its deadline or cancellation",
+                          own=False, code="deadline")
+
     def test_overdue_jobs_withdraw_it(self):
         for expected in ((1, "running"), (2, "running"), (3, "withdrawn")):
             self.assertEqual(body(self.daemon.ask("DELEGATE self:keeps deadline=200"))["error"], "deadline")
@@ -834,6 +841,22 @@ class Same(unittest.TestCase):
 
         said = self.both(talk)
         self.assertEqual([body(line) for line in said], [{"x": 5, "y": 0}] * 3 + [{"value": 3}])
+
+    def test_marks_of_events(self):
+        def talk(link, d):
+            link.ask("PUSH self:publish/6")
+            wait_until(lambda: d.ask("BIND self:topic/6") == '{"value":6}', "it is published")
+            return [link.ask(f"DELEGATE self:marks/self%3Atopic%2F6/{hops}") for hops in (0, 8, 17)]
+
+        said = self.both(talk)
+        self.assertEqual(said[:2], ["[1,1]", "[1,1]"])
+        self.assertIn("hops", body(said[2])["message"])
+
+    def test_events_do_not_come_beside_the_handler(self):
+        for d in (self.here, self.there):
+            self.assertEqual(d.ask("DELEGATE self:answers_first"), '{"value":1}')
+            wait_until(lambda d=d: json.loads(d.ask("PULL self:late_events"))[0] == 1, "the event has come")
+            self.assertEqual(d.ask("PULL self:late_events"), "[1,0]")
 
     def test_feeds_end_with_their_jobs(self):
         for d in (self.here, self.there):

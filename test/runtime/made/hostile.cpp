@@ -101,6 +101,14 @@ void until_stopped(const cles::responder& answer) {
 
 // -- what ends the process -----------------------------------------------------------------------------------------
 
+void insist(const cles::responder& answer, const cles::job_feed& from) {
+    from.next([answer, from](boost::system::error_code, const cles::job_event&) { insist(answer, from); });
+}
+void persist(const cles::responder& answer) {
+    const auto from = answer.bind("self:silent");
+    from.next([answer, from](boost::system::error_code, const cles::job_event&) { persist(answer); });
+}
+
 void register_ends(cles::registrar& to) {
     to.on_delegate("crashes", [] { crash(); });
     to.on_delegate("aborts", [] { std::abort(); });
@@ -170,6 +178,11 @@ void register_ends(cles::registrar& to) {
             kept.push_back(answer);
         });
     });
+    // Goes on after its end: with the feed that has ended, or with another one.
+    to.on_delegate("insists", [](const cles::request&, const cles::responder& answer) {
+        insist(answer, answer.bind("self:silent"));
+    });
+    to.on_delegate("persists", [](const cles::request&, const cles::responder& answer) { persist(answer); });
     to.on_delegate("exhausts_memory", [] {
         std::vector<std::unique_ptr<char[]>> all;
         for (;;) {
@@ -388,6 +401,39 @@ void register_jobs(cles::registrar& to) {
     to.on_delegate("follows", [](const cles::request& asked, const cles::responder& answer) {
         follow(answer, answer.bind(asked.parameter(0)), 1);
     });
+    // What the first event of a feed says about itself. Its parameters are the noun and the number of hops.
+    to.on_delegate("marks", [](const cles::request& asked, const cles::responder& answer) {
+        const auto how = cles::bind_options{}.mark().hops(asked.parameter<unsigned>(1));
+        const auto from = answer.bind(asked.parameter(0), how);
+        from.next([answer, from](boost::system::error_code code, const cles::job_event& event) {
+            if (code) {
+                answer.fail(static_cast<cles::errc>(code.value()), event.text);
+            } else {
+                answer.done(std::vector<std::uint64_t>{event.seq, event.epoch != 0 ? 1U : 0U});
+            }
+        });
+    });
+    // Asks for an event after its answer, and does not return at once. Counts the events, and those that have come
+    // before it had returned.
+    struct late_events {
+        std::atomic<int> all{0}, early{0};
+        std::atomic<bool> in_handler{false};
+    };
+    const auto late = std::make_shared<late_events>();
+    to.on_delegate("answers_first", [late](const cles::request&, const cles::responder& answer) {
+        late->in_handler = true;
+        const auto from = answer.bind("self:silent");
+        answer.done(1);
+        from.next([late](boost::system::error_code, const cles::job_event&) {
+            late->early += late->in_handler ? 1 : 0;
+            ++late->all;
+        });
+        for (int i = 0; i < 20 && late->all == 0; ++i) {
+            std::this_thread::sleep_for(1ms);
+        }
+        late->in_handler = false;
+    });
+    to.on_pull("late_events", [late] { return std::vector{late->all.load(), late->early.load()}; });
     to.on_delegate("ages", [](const cles::request& asked) {
         std::this_thread::sleep_for(std::chrono::milliseconds{asked.parameter<int>(0)});
         return "aged";
