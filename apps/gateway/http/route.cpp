@@ -27,11 +27,6 @@ constexpr std::array fixed_paths{fixed_path{"/session", place::session, "GET, PO
                                  fixed_path{"/metrics", place::metrics, "GET"},
                                  fixed_path{"/openapi.json", place::openapi, "GET"}};
 
-struct verb_path {
-    std::string_view name;
-    cles::verb verb;
-    std::string_view method;
-};
 constexpr std::array verb_paths{verb_path{"pull", cles::verb::pull, "GET"}, verb_path{"bind", cles::verb::bind, "GET"},
                                 verb_path{"push", cles::verb::push, "POST"},
                                 verb_path{"delegate", cles::verb::delegate, "POST"},
@@ -150,6 +145,12 @@ std::variant<route, refusal> fleet_route(const verb_path& how, std::string_view 
 }
 
 } // namespace
+
+const verb_path* find_verb_path(std::string_view verb) noexcept {
+    const auto* const found =
+        std::ranges::find_if(verb_paths, [verb](const verb_path& each) { return to_string(each.verb) == verb; });
+    return found == verb_paths.end() ? nullptr : found;
+}
 
 bool is_node_or_task(std::string_view text) noexcept {
     return !text.empty() && text.size() <= longest_name && std::ranges::all_of(text, [](char c) {

@@ -37,6 +37,15 @@ struct route {
 /// Of a noun in a path.
 inline constexpr std::size_t most_parameters = 32;
 
+/// How clients request a verb: GET /pull/...
+struct verb_path {
+    std::string_view name;
+    cles::verb verb;
+    std::string_view method;
+};
+/// \param verb "PULL" \return null if clients cannot request it
+const verb_path* find_verb_path(std::string_view verb) noexcept;
+
 /// Whether a node or a task may have this name in a path.
 bool is_node_or_task(std::string_view text) noexcept;
 

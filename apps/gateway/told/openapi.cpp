@@ -15,7 +15,6 @@
 #include <boost/describe/class.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <set>
 
@@ -33,22 +32,6 @@ BOOST_DESCRIBE_STRUCT(described_node, (), (types, tasks))
 
 constexpr std::size_t most_bytes = 8U << 20U; // of all schemas
 constexpr std::size_t most_operations = 4096;
-
-struct operation_path {
-    std::string_view verb;
-    std::string_view path;
-    std::string_view method;
-};
-constexpr std::array operation_paths{operation_path{"PULL", "pull", "get"}, operation_path{"BIND", "bind", "get"},
-                                     operation_path{"PUSH", "push", "post"},
-                                     operation_path{"DELEGATE", "delegate", "post"},
-                                     operation_path{"UPDATE", "update", "post"}};
-
-// Null if clients cannot request it.
-const operation_path* find_operation(std::string_view verb) noexcept {
-    const auto* const found = std::ranges::find(operation_paths, verb, &operation_path::verb);
-    return found == operation_paths.end() ? nullptr : found;
-}
 
 // What operations share.
 constexpr std::string_view shared_components =
@@ -133,16 +116,16 @@ std::vector<std::string> parameter_names(const offered_task& task) {
 }
 
 // "/push/car1/target":{"post":{...}}
-std::string operation_text(const offering_node& node, const offered_task& task, const operation_path& how,
+std::string operation_text(const offering_node& node, const offered_task& task, const verb_path& how,
                            schema_members& schemas) {
     const auto found = node.schemas.find({task.verb, task.task});
     const cles::task_schemas none{};
     const auto& told = found == node.schemas.end() ? none : found->second;
     const auto name = node.name + "." + task.verb + "." + task.task;
-    const bool is_stream = how.path == "bind";
+    const bool is_stream = how.verb == cles::verb::bind;
     const auto result =
         is_stream ? schemas.add(name + ".updates", told.updates) : schemas.add(name + ".result", told.result);
-    auto path = "/" + std::string{how.path} + "/" + node.name + "/" + task.task;
+    auto path = "/" + std::string{how.name} + "/" + node.name + "/" + task.task;
     std::string parameters;
     for (const auto& parameter : parameter_names(task)) {
         path.append("/{").append(parameter).append("}");
@@ -150,11 +133,11 @@ std::string operation_text(const offering_node& node, const offered_task& task, 
         parameters.append(R"(,"in":"path","required":true,"schema":{"type":"string"}},)");
     }
     parameters.append(R"({"$ref":"#/components/parameters/deadline"})").append(is_stream ? terms_of_binding : "");
-    auto out = json_string(path) + R"(:{")" + std::string{how.method} + R"(":{"operationId":)";
+    auto out = json_string(path) + R"(:{")" + small_letters(how.method) + R"(":{"operationId":)";
     out.append(json_string(path.substr(1))).append(R"(,"summary":)");
     out.append(json_string(task.description.value_or(task.verb + " " + node.name + ":" + task.task)));
     out.append(R"(,"tags":[)").append(json_string(node.name)).append(R"(],"parameters":[)").append(parameters);
-    if (how.method == "post") {
+    if (how.method == "POST") {
         out.append(R"(],"requestBody":{"content":{"application/json":{"schema":)");
         out.append(schemas.add(name + ".body", told.body)).append("}}}");
     } else {
@@ -171,7 +154,7 @@ std::string operation_text(const offering_node& node, const offered_task& task, 
 // Leaves out what clients could not request, and what is too long.
 std::vector<offered_task> usable_tasks(std::vector<offered_task> told) {
     std::erase_if(told, [](const offered_task& each) {
-        return find_operation(each.verb) == nullptr || !is_node_or_task(each.task) ||
+        return find_verb_path(each.verb) == nullptr || !is_node_or_task(each.task) ||
                (each.parameters && each.parameters->size() > most_parameters);
     });
     told.resize(std::min(told.size(), told_limits::tasks));
@@ -208,7 +191,7 @@ void add_schemas(offering_node& node, const std::string& task, std::string_view 
         const std::string verb{key};
         std::string_view raw;
         good = r.read_raw(raw);
-        if (find_operation(verb) == nullptr) {
+        if (find_verb_path(verb) == nullptr) {
             continue;
         }
         try {
@@ -225,7 +208,7 @@ std::string openapi_document(const std::vector<offering_node>& nodes) {
     std::set<std::string> told;
     for (const auto& node : nodes) {
         for (const auto& task : node.tasks) {
-            const auto* const how = find_operation(task.verb);
+            const auto* const how = find_verb_path(task.verb);
             const bool is_plain = is_node_or_task(node.name) && is_node_or_task(task.task);
             if (how != nullptr && is_plain && told.size() < most_operations &&
                 told.insert(task.verb + " " + node.name + ":" + task.task).second) {
