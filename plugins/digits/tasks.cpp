@@ -5,6 +5,7 @@
 
 #include "descent.hpp"
 #include "order.hpp"
+#include "sgd/take_steps.hpp"
 
 #include <chrono>
 #include <cmath>
@@ -59,17 +60,8 @@ void train(const cles::request& asked, const cles::responder& answer, const imag
     const auto what = asked.as<order>();
     const auto how = checked(what);
     descent work{images, checked(what.start, images), how};
-    bool heard = true;
-    int reported = 0;
-    while (work.step()) {
-        if (answer.stopped()) {
-            answer.fail(errc::cancelled, "stopped");
-            return;
-        }
-        if (const auto percent = static_cast<int>(work.part_done() * 100); heard && percent > reported) {
-            reported = percent;
-            heard = answer.progress(work.part_done());
-        }
+    if (!sgd::take_steps(work, answer)) {
+        return;
     }
     if (work.diverged()) {
         throw error(errc::failed, diverged);

@@ -4,6 +4,7 @@
 #include <cles/setting_error.hpp>
 
 #include "order.hpp"
+#include "take_steps.hpp"
 #include "training.hpp"
 
 #include <chrono>
@@ -52,17 +53,8 @@ void train(const cles::request& asked, const cles::responder& answer, const data
     const auto what = asked.as<order>();
     const auto how = checked(what, data);
     training work{data, {.first = what.first, .count = what.count}, how, what.start.value_or(classifier{})};
-    bool heard = true;
-    int reported = 0;
-    while (work.step()) {
-        if (answer.stopped()) {
-            answer.fail(errc::cancelled, "stopped");
-            return;
-        }
-        if (const auto percent = static_cast<int>(work.part_done() * 100); heard && percent > reported) {
-            reported = percent;
-            heard = answer.progress(work.part_done());
-        }
+    if (!take_steps(work, answer)) {
+        return;
     }
     if (!is_finite(work.result())) {
         throw error(errc::failed, diverged);
