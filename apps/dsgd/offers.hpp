@@ -25,6 +25,16 @@ struct offers {
     BOOST_DESCRIBE_CLASS(offers, (), (results, errors), (), ())
 };
 
+/// What is known of a node; empty if it is not known.
+inline cles::peer peer_of(const cles::service& member, const std::string& node) {
+    for (auto& each : member.peers()) {
+        if (each.node == node) {
+            return each;
+        }
+    }
+    return {};
+}
+
 // For a node that is busy as well; one that has stopped takes all of it.
 inline constexpr std::chrono::seconds find_deadline{5};
 

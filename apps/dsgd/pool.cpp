@@ -79,24 +79,15 @@ void pool::admit(const sgd::recipe& data, const std::vector<std::string>& member
     data_ = data;
     newcomers_ = newcomers{names};
     for (const auto& node : members) {
-        newcomers_.joined(node, peer_of(node).epoch);
+        newcomers_.joined(node, peer_of(node_, node).epoch);
     }
-}
-
-cles::peer pool::peer_of(const std::string& node) const {
-    for (auto& each : node_.peers()) {
-        if (each.node == node) {
-            return each;
-        }
-    }
-    return {};
 }
 
 void pool::train(board& all, const char* what) {
     round now{io_, all, what};
     now_ = &now;
     for (const auto& member : newcomers_.members()) {
-        all.join(member.first, peer_of(member.first).load.workers);
+        all.join(member.first, peer_of(node_, member.first).load.workers);
     }
     begin(now);
     ++now.open;
@@ -231,7 +222,7 @@ boost::asio::awaitable<void> pool::meet(std::string node, std::string epoch) {
         }
         newcomers_.joined(node, epoch);
         if (now_ != nullptr && now_->running != 0) {
-            now_->all.join(node, peer_of(node).load.workers);
+            now_->all.join(node, peer_of(node_, node).load.workers);
             std::fprintf(stderr, "cles-dsgd: %s takes part from now on\n", cles::printable(node).c_str());
             begin(*now_);
         }

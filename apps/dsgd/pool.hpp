@@ -34,7 +34,6 @@ class pool {
     boost::asio::awaitable<void> delegate(round& now, std::size_t attempt);
     boost::asio::awaitable<void> watch(round& now);
     boost::asio::awaitable<void> meet(std::string node, std::string epoch);
-    [[nodiscard]] cles::peer peer_of(const std::string& node) const;
 
     std::chrono::seconds deadline_;
     bool progress_;

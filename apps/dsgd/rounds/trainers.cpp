@@ -82,11 +82,8 @@ std::map<std::string, digits::offer> trainers::find(std::uint32_t pixels, std::u
                                                            std::to_string(offer.classes) + " classes");
         }
     }
-    const auto peers = node_.peers();
     for (const auto& each : found) {
-        const auto peer =
-            std::find_if(peers.begin(), peers.end(), [&](const cles::peer& one) { return one.node == each.first; });
-        newcomers_.joined(each.first, peer == peers.end() ? std::string{} : peer->epoch);
+        newcomers_.joined(each.first, peer_of(node_, each.first).epoch);
     }
     return found;
 }
