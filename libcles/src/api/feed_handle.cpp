@@ -262,7 +262,7 @@ std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std
                              options.every_.count(), 0, static_cast<std::int64_t>(protocol::max_deadline_ms))),
                          .keep = options.keep_,
                          .hops = options.hops_,
-                         .adverbs = is_own ? std::string{} : "from=" + options.on_behalf_of_,
+                         .adverbs = is_own ? std::string{} : protocol::adverb_from(options.on_behalf_of_),
                          .shows_mark = options.mark_,
                          .requester = options.on_behalf_of_});
     return made;

@@ -336,7 +336,7 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     const auto id = draw_id();
     const auto started = now();
     const auto deadline = saturating_add(started, time_limit(options.deadline_, how));
-    const auto adverbs = is_own ? std::string{} : "from=" + options.on_behalf_of_;
+    const auto adverbs = is_own ? std::string{} : protocol::adverb_from(options.on_behalf_of_);
     protocol::outgoing_request request{.verb = how,
                                        .noun = text,
                                        .id = id,

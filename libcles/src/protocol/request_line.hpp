@@ -31,6 +31,9 @@ inline constexpr std::size_t max_since = 64;
 inline constexpr std::size_t max_described = 64;
 inline constexpr std::size_t max_sig = 128; // a signature has 86 characters
 
+/// The adverb of a request for a member whose node it does not come from.
+inline std::string adverb_from(std::string_view member) { return "from=" + std::string{member}; }
+
 /// The value of `routes=8.car1` on `PULL self:cles/peers`.
 struct routes_question {
     unsigned distance = 0; ///< of the nodes that are to ask for routes too, in links; 0: no routes are asked for

@@ -311,7 +311,7 @@ void feed_links::unbind(feed_machine& feed) {
     // Another feed may share the binding.
     if (c && c->usable() && !host_.stopped() && !c->session().bound().has(feed.target(), feed.path())) {
         const auto& terms = feed.entry().terms;
-        const auto whose = terms.requester.empty() ? std::string{} : "from=" + terms.requester;
+        const auto whose = terms.requester.empty() ? std::string{} : protocol::adverb_from(terms.requester);
         c->session().asking().send(
             {.verb = verb::bind, .noun = terms.noun, .id = host_.draw_id(), .lease_ms = 0, .adverbs = whose},
             saturating_add(now, time_limit({}, verb::bind)), now, detail::pending_ptr{new discarded_reply});
