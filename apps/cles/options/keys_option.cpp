@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "options/keys_option.hpp"
 
+#include "options/user_folder.hpp"
 #include "output/errors.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 
-#include <cstdlib>
-
 namespace tool {
-namespace {
-
-// Empty if it is not set.
-std::string variable(const char* name) {
-    const char* value = std::getenv(name);
-    return value == nullptr ? "" : value;
-}
-
-} // namespace
 
 void keys_option::add_to(CLI::App& command, const std::string& help) {
     command.add_option("-k,--keys", given_, help + " (default CLES_KEYS, otherwise ~/.config/cles/keys)")
@@ -28,17 +18,14 @@ void keys_option::add_optional_to(CLI::App& command, const std::string& help) {
     command.add_option("-k,--keys", given_, help + " (default CLES_KEYS, otherwise none)")->type_name("DIR");
 }
 
-std::string keys_option::given_directory() const { return given_.empty() ? variable("CLES_KEYS") : given_; }
+std::string keys_option::given_directory() const { return given_.empty() ? variable_or_nothing("CLES_KEYS") : given_; }
 
 std::string keys_option::directory() const {
     if (auto given = given_directory(); !given.empty()) {
         return given;
     }
-    if (const auto configuration = variable("XDG_CONFIG_HOME"); !configuration.empty()) {
-        return configuration + "/cles/keys";
-    }
-    if (const auto home = variable("HOME"); !home.empty()) {
-        return home + "/.config/cles/keys";
+    if (const auto folder = user_folder(); !folder.empty()) {
+        return (folder / "keys").string();
     }
     throw usage_error("which directory has the keys? Give --keys DIR, or set CLES_KEYS");
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "options/saved_contexts.hpp"
 
+#include "options/user_folder.hpp"
 #include "output/errors.hpp"
 
 #include <cerrno>
@@ -16,18 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string variable_or_nothing(const char* name) {
-    const char* value = std::getenv(name);
-    return value == nullptr ? "" : value;
-}
-
 // Empty if there is no place for it.
 fs::path contexts_file() {
-    if (const auto configuration = variable_or_nothing("XDG_CONFIG_HOME"); !configuration.empty()) {
-        return fs::path{configuration} / "cles" / "contexts.json";
-    }
-    const auto home = variable_or_nothing("HOME");
-    return home.empty() ? fs::path{} : fs::path{home} / ".config" / "cles" / "contexts.json";
+    const auto folder = user_folder();
+    return folder.empty() ? fs::path{} : folder / "contexts.json";
 }
 
 saved_context find_used_context() {
