@@ -4,7 +4,6 @@
 #include "client/client.hpp"
 #include "commands.hpp"
 #include "commands/feed_arguments.hpp"
-#include "options/arguments.hpp"
 #include "options/common_options.hpp"
 #include "output/printer.hpp"
 #include "output/terminal.hpp"
@@ -31,23 +30,17 @@ struct bind_arguments {
 
 using bound_item = feed_set::item;
 
-// The node that publishes it, and what it publishes: "car1", "localization".
-std::pair<std::string, std::string> source_of(const std::string& noun, const bound_item& item) {
-    const std::string target{target_of(noun)};
-    return {item.publisher.empty() ? target : item.publisher, noun.substr(target.size() + 1)};
-}
-
 // The last value, in the reply to BIND, has no number.
 std::string with_source(const std::string& noun, const bound_item& item, bool is_of_many) {
-    const auto [node, path] = source_of(noun, item);
+    const auto source = source_of(noun, item);
     std::string text;
     cles::json_writer w{text};
     w.begin_object();
     w.plain_key("node");
-    w.value(std::string_view{node});
+    w.value(std::string_view{source.node});
     if (is_of_many) {
         w.plain_key("noun");
-        w.value(std::string_view{path});
+        w.value(std::string_view{source.path});
     }
     w.plain_key("seq");
     if (item.kind == cles::feed_event::update) {
@@ -69,9 +62,9 @@ void show(printer& out, const bind_arguments& args, const std::string& noun, con
     if (!is_of_many && !noun.starts_with("all:")) {
         out.print(item.value.text, std::move(leading));
     } else if (resolved(args.format) == output_format::table) {
-        const auto [node, path] = source_of(noun, item);
-        leading.insert(leading.begin(), is_of_many ? json_cell{"NOUN", printable(node + ":" + path), false}
-                                                   : json_cell{"NODE", printable(node), false});
+        const auto source = source_of(noun, item);
+        leading.insert(leading.begin(), is_of_many ? json_cell{"NOUN", printable(source.noun()), false}
+                                                   : json_cell{"NODE", printable(source.node), false});
         out.print(item.value.text, std::move(leading));
     } else {
         out.print(with_source(noun, item, is_of_many));

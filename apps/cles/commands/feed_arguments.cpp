@@ -201,6 +201,11 @@ asio::awaitable<void> follow_values(client& requester, const feed_arguments& arg
     co_await follow(requester, args, on_item);
 }
 
+event_source source_of(const std::string& noun, const feed_set::item& what) {
+    const std::string target{target_of(noun)};
+    return {.node = what.publisher.empty() ? target : what.publisher, .path = noun.substr(target.size() + 1)};
+}
+
 void note_event(const std::string& noun, const cles::feed_item<cles::json_text>& item) {
     // For `all:`, the node whose update it was.
     const bool is_of_all = noun.starts_with("all:") && !item.publisher.empty();

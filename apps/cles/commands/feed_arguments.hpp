@@ -67,6 +67,15 @@ boost::asio::awaitable<void>
 follow_values(client& requester, const feed_arguments& args,
               std::function<void(const std::string& noun, const feed_set::item& what)> show);
 
+/// What an event is about.
+struct event_source {
+    std::string node; ///< that publishes it
+    std::string path; ///< what it publishes: "localization"
+
+    [[nodiscard]] std::string noun() const { return node + ":" + path; }
+};
+event_source source_of(const std::string& noun, const feed_set::item& what);
+
 /// Reports an event of a feed on stderr: updates missed, its publisher lost or found again.
 void note_event(const std::string& noun, const cles::feed_item<cles::json_text>& item);
 

@@ -6,7 +6,6 @@
 #include "client/client.hpp"
 #include "commands.hpp"
 #include "commands/feed_arguments.hpp"
-#include "options/arguments.hpp"
 #include "output/printer.hpp"
 #include "output/terminal.hpp"
 
@@ -33,11 +32,6 @@ struct sniff_arguments {
     output_format format = output_format::automatic;
 };
 
-std::string noun_at(const std::string& noun, const feed_set::item& item) {
-    const auto target = target_of(noun);
-    return (item.publisher.empty() ? std::string{target} : item.publisher) + noun.substr(target.size());
-}
-
 // "12:00:00.000", of this host's time zone.
 std::string local_clock_text(wall_clock::time_point at) {
     const auto since = std::chrono::floor<std::chrono::milliseconds>(at.time_since_epoch()).count();
@@ -52,8 +46,8 @@ std::string local_clock_text(wall_clock::time_point at) {
 
 std::string sniffed_line(const std::string& noun, const feed_set::item& item) {
     const auto seq = item.kind == cles::feed_event::update ? "#" + std::to_string(item.seq) : std::string{"-"};
-    return local_clock_text(wall_clock::now()) + "  " + bold(stream::out, printable(noun_at(noun, item))) + "  " + seq +
-           "  " + printable(item.value.text) + "\n";
+    return local_clock_text(wall_clock::now()) + "  " + bold(stream::out, printable(source_of(noun, item).noun())) +
+           "  " + seq + "  " + printable(item.value.text) + "\n";
 }
 
 std::string sniffed_json(const std::string& noun, const feed_set::item& item) {
@@ -63,7 +57,7 @@ std::string sniffed_json(const std::string& noun, const feed_set::item& item) {
     w.plain_key("at");
     cles::write_json(w, std::chrono::floor<std::chrono::milliseconds>(wall_clock::now()));
     w.plain_key("noun");
-    w.value(std::string_view{noun_at(noun, item)});
+    w.value(std::string_view{source_of(noun, item).noun()});
     w.plain_key("seq");
     if (item.kind == cles::feed_event::update) {
         w.value(item.seq);
