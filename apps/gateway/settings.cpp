@@ -10,7 +10,7 @@
 
 #include "client/member_key.hpp"
 #include "gateway/http/message.hpp"
-#include "options/arguments.hpp"
+#include "options/addresses.hpp"
 #include "options/pool_option.hpp"
 #include "output/errors.hpp"
 
@@ -64,11 +64,8 @@ void check_origin_option(const std::string& text) {
 
 void add_peers(cles::service_options& to, const std::vector<std::string>& texts) {
     for (const auto& text : texts) {
-        const auto equals = text.find('=');
-        if (equals == std::string::npos || !tool::is_name(text.substr(0, equals))) {
-            throw tool::usage_error("--peer '" + text + "': write NAME=URL, as in car1=tcp://127.0.0.1:25370");
-        }
-        to.peers.insert_or_assign(text.substr(0, equals), text.substr(equals + 1));
+        auto [name, url] = tool::named_url(text);
+        to.peers.insert_or_assign(std::move(name), std::move(url));
     }
 }
 

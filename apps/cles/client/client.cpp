@@ -221,8 +221,7 @@ void client::suggest_address() {
     const auto target = target_of(noun_);
     std::string hint;
     if (!addresses_.finds_by_name()) {
-        const bool has_asked_another =
-            addresses_.has_url() && !target.empty() && target != "self" && target != "any" && target != "all";
+        const bool has_asked_another = addresses_.has_url() && !target.empty() && !stands_for_others(target);
         hint = has_asked_another ? "cles ls --at URL lists the nodes that the node there knows" : "";
     } else if (target == "any" || target == "all") {
         const auto known = node_.peers();

@@ -185,7 +185,7 @@ class tracer {
     }
 
     void remember(const std::string& name) {
-        const bool is_node = is_name(name) && name != "any" && name != "all" && name != "self";
+        const bool is_node = is_name(name) && !stands_for_others(name);
         if (is_node && std::find(names_.begin(), names_.end(), name) == names_.end()) {
             names_.push_back(name);
         }

@@ -10,6 +10,7 @@
 #include "discovery/ask_all.hpp"
 #include "discovery/find_nodes.hpp"
 #include "options/addresses.hpp"
+#include "options/arguments.hpp"
 #include "output/errors.hpp"
 #include "output/json_node.hpp"
 
@@ -28,9 +29,6 @@ using steady = std::chrono::steady_clock;
 namespace {
 
 constexpr std::size_t most_asked = 256; // nodes; more would be a load of their own
-
-// A node may tell of others whatever it likes, and these are not names of nodes: they would bind something else.
-bool stands_for_others(std::string_view name) { return name == "self" || name == "any" || name == "all"; }
 
 // Whether the node has no list of its nouns, at least not for this member.
 bool does_not_tell(boost::system::error_code why) { return why == cles::errc::no_task || why == cles::errc::denied; }

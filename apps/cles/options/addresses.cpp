@@ -78,6 +78,14 @@ std::string joined(const std::vector<std::string>& names, const char* separator)
     return all;
 }
 
+std::pair<std::string, std::string> named_url(const std::string& text) {
+    const auto equals = text.find('=');
+    if (equals == std::string::npos || !is_name(text.substr(0, equals))) {
+        throw usage_error("--peer '" + text + "': write NAME=URL, as in car1=tcp://127.0.0.1:25370");
+    }
+    return {text.substr(0, equals), text.substr(equals + 1)};
+}
+
 void address_book::add_options(CLI::App& command, const std::string& multicast_help) {
     auto* at =
         command.add_option("-a,--at", at_,
@@ -162,15 +170,11 @@ void address_book::check() const {
         check_url(url);
     }
     for (const auto& peer : peer_texts()) {
-        const auto equals = peer.find('=');
-        const std::string_view name = std::string_view{peer}.substr(0, equals);
-        if (equals == std::string::npos || !is_name(name)) {
-            throw usage_error("--peer '" + peer + "': write NAME=URL, as in car1=tcp://127.0.0.1:25370");
+        const auto [name, url] = named_url(peer);
+        if (stands_for_others(name)) {
+            throw usage_error("--peer '" + peer + "': " + name + " is not the name of a node");
         }
-        if (name == "self" || name == "any" || name == "all") {
-            throw usage_error("--peer '" + peer + "': " + std::string{name} + " is not the name of a node");
-        }
-        check_url(peer.substr(equals + 1));
+        check_url(url);
     }
     for (const auto& user : local_users_) {
         const auto equals = user.find('=');
@@ -211,7 +215,7 @@ std::string address_book::url_for(std::string_view node) const {
     if (url.empty() && !peer_texts().empty()) {
         throw cles::error(cles::errc::no_target, "there is no --peer '" + std::string{node} + "', and no --at");
     }
-    if (finds_by_name() && node != "self" && node != "any" && node != "all") {
+    if (finds_by_name() && !stands_for_others(node)) {
         return {};
     }
     return url.empty() ? std::string{default_node()} : url;

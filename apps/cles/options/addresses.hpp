@@ -44,6 +44,9 @@ class multicast_option {
 /// "lo, eth0"
 std::string joined(const std::vector<std::string>& names, const char* separator = ", ");
 
+/// The two parts of the text of --peer, NAME=URL. \throws usage_error if it has another form
+std::pair<std::string, std::string> named_url(const std::string& text);
+
 struct saved_context;
 
 /// --at, --peer and --multicast: where the command finds the nodes that it talks to. --keys: as whom it does so.

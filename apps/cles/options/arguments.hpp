@@ -9,6 +9,11 @@ namespace tool {
 /// 1 to 64 letters, digits, '_', '-', '.'
 bool is_name(std::string_view text);
 
+/// Whether it is the name of no node, but stands for others: self, any or all.
+inline bool stands_for_others(std::string_view name) noexcept {
+    return name == "self" || name == "any" || name == "all";
+}
+
 /// The node that a noun names.
 std::string_view target_of(std::string_view noun);
 

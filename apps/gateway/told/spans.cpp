@@ -5,6 +5,7 @@
 
 #include "gateway/http/message.hpp"
 #include "gateway/told/told_limits.hpp"
+#include "options/arguments.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -148,7 +149,7 @@ void add_nodes(const tool::trace_document& document, std::vector<std::string>& n
             if (names.size() >= most) {
                 return;
             }
-            const bool is_node = !name.empty() && name != "any" && name != "all" && name != "self";
+            const bool is_node = !name.empty() && !tool::stands_for_others(name);
             if (span.kind == "sent" && is_node && std::ranges::find(names, name) == names.end()) {
                 names.push_back(name);
             }
