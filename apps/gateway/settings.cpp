@@ -62,13 +62,6 @@ void check_origin_option(const std::string& text) {
     }
 }
 
-void add_peers(cles::service_options& to, const std::vector<std::string>& texts) {
-    for (const auto& text : texts) {
-        auto [name, url] = tool::named_url(text);
-        to.peers.insert_or_assign(std::move(name), std::move(url));
-    }
-}
-
 void add_federation(cles::service_options& to, const tool::gateway_arguments& given) {
     if (given.nats.empty()) {
         return;
@@ -135,7 +128,10 @@ cles::service_options node_options_of(const tool::gateway_arguments& given, cons
     if (options.listen.empty()) {
         options.listen.emplace_back(keys.empty() ? "tcp://127.0.0.1:0" : "tls://0.0.0.0:0");
     }
-    add_peers(options, given.peers);
+    for (const auto& text : given.peers) {
+        auto [name, url] = tool::named_url(text);
+        options.peers.insert_or_assign(std::move(name), std::move(url));
+    }
     if (!given.seeds.empty()) {
         options.gossip = cles::gossip(given.seeds);
     }
