@@ -8,6 +8,7 @@ import re
 import signal
 import socket
 import tempfile
+import threading
 from collections import namedtuple
 
 from support import PATIENCE, environment, finish, free_port, read_line, start
@@ -124,6 +125,43 @@ class Events:
 
     def __exit__(self, *_):
         self.close()
+
+
+class FakeNodes:
+    """Nodes that are announced to the group of an environment. Each replies the same text to each request."""
+
+    def __init__(self, env, names, text):
+        self.reply = text.encode()
+        self.listener = socket.create_server(("127.0.0.1", 0))
+        threading.Thread(target=self._accept, daemon=True).start()
+        group, port = env["CLES_MULTICAST"].split(",")[1].split(":")
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as announcer:
+            announcer.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
+            announcer.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
+            url = f"tcp://127.0.0.1:{self.listener.getsockname()[1]}"
+            for epoch, name in enumerate(names, 1):
+                said = {"node": name, "endpoints": [url], "interval_ms": 60000, "tasks": ""}
+                announcer.sendto(f"UPDATE {name}:cles seq=1 epoch={epoch:08x} {json.dumps(said)}\n".encode(), (group, int(port)))
+
+    def _accept(self):
+        while True:
+            try:
+                client, _ = self.listener.accept()
+            except OSError:  # it is closed
+                return
+            threading.Thread(target=self._serve, args=(client,), daemon=True).start()
+
+    def _serve(self, client):
+        with client, client.makefile("rb") as lines:
+            for line in lines:
+                if found := re.search(rb" id=(\d+)", line):
+                    try:
+                        client.sendall(b"id=" + found[1] + b" " + self.reply + b"\n")
+                    except OSError:
+                        return
+
+    def close(self):
+        self.listener.close()
 
 
 def own_group():

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/json_reader.hpp>
 
+#include "gateway/told/metrics.hpp"
 #include "gateway/told/openapi.hpp"
 
 #include <boost/test/unit_test.hpp>
 
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -18,7 +20,10 @@ constexpr const char* two_cars =
     R"({"verb":"PULL","task":"speed"},{"verb":"BIND","task":"speed"}]},)"
     R"("car2":{"node":"car2","tasks":[]},"car3":{"node":"car3"},"car4":7},"errors":{}})";
 
-std::vector<gateway::offering_node> cars() { return gateway::offering_nodes(two_cars); }
+std::vector<gateway::offering_node> nodes_in(std::string_view reply) {
+    return gateway::offering_nodes(gateway::results_of_all(reply));
+}
+std::vector<gateway::offering_node> cars() { return nodes_in(two_cars); }
 
 bool contains_text(const std::string& document, const std::string& part) {
     return document.find(part) != std::string::npos;
@@ -46,7 +51,7 @@ BOOST_AUTO_TEST_CASE(nodes_tell_what_they_offer) {
     BOOST_TEST(nodes[0].types == "d1");
     BOOST_TEST(nodes[0].tasks.size() == 3U);
     BOOST_TEST(nodes[1].types == "");
-    BOOST_TEST(gateway::offering_nodes("[]").empty());
+    BOOST_TEST(nodes_in("[]").empty());
 }
 
 BOOST_AUTO_TEST_CASE(each_task_is_an_operation) {
@@ -137,8 +142,8 @@ BOOST_AUTO_TEST_CASE(what_is_too_long_or_too_much_is_left_out) {
     for (int i = 0; i < 2000; ++i) {
         tasks += R"(,{"verb":"PULL","task":"t)" + std::to_string(i) + "\"}";
     }
-    auto nodes = gateway::offering_nodes(R"({"results":{"car1":{"types":")" + std::string(65, 'a') + R"(","tasks":[)" +
-                                         tasks + "]}}}");
+    auto nodes =
+        nodes_in(R"({"results":{"car1":{"types":")" + std::string(65, 'a') + R"(","tasks":[)" + tasks + "]}}}");
     BOOST_TEST_REQUIRE(nodes.size() == 1U);
     BOOST_TEST(nodes[0].types == "");
     BOOST_TEST_REQUIRE(nodes[0].tasks.size() == 1024U);

@@ -16,7 +16,7 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
-from gateway_support import Gateway, own_group
+from gateway_support import FakeNodes, Gateway, own_group
 from support import PATIENCE, Node, wait_until
 
 try:
@@ -189,6 +189,24 @@ class Telemetry(unittest.TestCase):
         self.gateway.get("/pull/car1/echo/3", Traceparent=f"00-{other}-b7ad6b7169203331-01")
         wait_until(lambda: other in told(), "the next one is told")
         self.assertNotIn(silent, told())
+
+
+class LargeFleet(unittest.TestCase):
+    def test_what_all_nodes_tell_need_not_fit_into_one_reply(self):
+        env = own_group()
+        gateway = Gateway(env=env)
+        self.addCleanup(gateway.stop)
+        told = {"uptime_ms": 7000, "tasks": [{"verb": "PULL", "task": "speed"}], "more": "x" * (3 << 20)}
+        nodes = FakeNodes(env, ["fake1", "fake2", "fake3"], json.dumps(told))
+        self.addCleanup(nodes.close)
+        wait_until(lambda: gateway.get("/pull/fake3/cles").status == 200, "they are known")
+        self.assertEqual(gateway.get("/pull/all/cles").status, 413)
+        text = gateway.get("/metrics").body
+        for name in ("fake1", "fake2", "fake3"):
+            self.assertIn(f'cles_uptime_seconds{{node="{name}"}} 7', text)
+        self.assertIn('cles_uptime_seconds{node="gateway"}', text)
+        paths = json.loads(gateway.get("/openapi.json").body)["paths"]
+        self.assertLessEqual({"/pull/fake1/speed", "/pull/fake2/speed", "/pull/fake3/speed"}, set(paths))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <map>
 #include <set>
 #include <utility>
 #include <vector>
@@ -31,6 +32,8 @@ constexpr auto patience_with_types = 3s;              // of all nodes
 constexpr std::size_t most_types_of_task = 1U << 20U; // bytes, of what a node tells
 constexpr std::size_t most_types_at_once = 8U << 20U; // of one document
 constexpr std::size_t most_types_known = 16U << 20U;
+constexpr std::size_t most_told_by_all = 32U << 20U; // bytes, if each is asked
+constexpr std::size_t most_asked_at_once = 16;
 
 /// What all have in common: the client, which is null once it is gone, or has its response.
 class client_exchange : public exchange {
@@ -310,33 +313,31 @@ class binding_exchange final : public client_exchange, public std::enable_shared
     bool is_waiting_ = false;
 };
 
-class metrics_exchange final : public client_exchange, public std::enable_shared_from_this<metrics_exchange> {
+/// What all nodes tell. The node of the gateway is not there any more if nobody wants the response.
+class fleet_exchange : public client_exchange, public std::enable_shared_from_this<fleet_exchange> {
   public:
-    using client_exchange::client_exchange;
+    fleet_exchange(std::shared_ptr<response_sink> to, asked asked_for, cles::service& node, std::string path)
+        : client_exchange(std::move(to), std::move(asked_for)), node_(node), path_(std::move(path)) {}
 
-    void start(cles::service& node, metrics_format format) {
-        cles::call_options options;
-        options.deadline(patience_with_all).diagnostics(why());
-        what().state_member(options);
-        node.async_pull("all:cles/metrics", options,
-                        [self = shared_from_this(), format](error_code code, const cles::json_text& reply) {
-                            if (code) {
-                                self->respond(code);
-                            } else if (self->is_wanted()) {
-                                self->respond(metrics_text(results_of_all(reply.text), format), type_of(format));
-                            }
-                        });
+    /// Asks all at once. If the replies of a large fleet are too much for one, each node that is known is asked.
+    void start() {
+        auto chosen = options(patience_with_all);
+        chosen.diagnostics(why());
+        node_.async_pull("all:" + path_, chosen,
+                         [self = shared_from_this()](error_code code, const cles::json_text& reply) {
+                             if (code == cles::errc::too_large && self->is_wanted()) {
+                                 self->ask_each();
+                             } else if (code) {
+                                 self->respond(code);
+                             } else if (self->is_wanted()) {
+                                 self->on_replies(results_of_all(reply.text));
+                             }
+                         });
     }
-};
 
-class openapi_exchange final : public client_exchange, public std::enable_shared_from_this<openapi_exchange> {
-  public:
-    openapi_exchange(std::shared_ptr<response_sink> to, asked asked_for, cles::service& node, type_cache& known)
-        : client_exchange(std::move(to), std::move(asked_for)), node_(node), known_(known) {}
-
-    void start() { asio::co_spawn(node_.get_executor(), run(shared_from_this()), asio::detached); }
-
-  private:
+  protected:
+    virtual void on_replies(std::map<std::string, std::string> told) = 0;
+    [[nodiscard]] cles::service& node() const noexcept { return node_; }
     [[nodiscard]] cles::call_options options(std::chrono::milliseconds deadline) const {
         cles::call_options made;
         made.deadline(deadline);
@@ -344,16 +345,74 @@ class openapi_exchange final : public client_exchange, public std::enable_shared
         return made;
     }
 
-    static asio::awaitable<void> run(std::shared_ptr<openapi_exchange> self) {
-        std::vector<offering_node> nodes;
-        try {
-            const auto chosen = self->options(patience_with_all);
-            const cles::json_text reply = co_await self->node_.async_pull("all:cles", chosen);
-            nodes = offering_nodes(reply.text);
-        } catch (const cles::error& e) {
-            self->why() = e.message();
-            self->respond(e.code());
+  private:
+    void ask_each() {
+        left_.insert(node_.name());
+        for (const auto& peer : node_.peers()) {
+            left_.insert(peer.node);
         }
+        end_ = std::chrono::steady_clock::now() + patience_with_all;
+        ask_next();
+    }
+    void ask_next() {
+        while (open_ < most_asked_at_once && !left_.empty() && std::chrono::steady_clock::now() < end_) {
+            const auto name = std::move(left_.extract(left_.begin()).value());
+            ++open_;
+            node_.async_pull(name + ":" + path_, options(patience_with_one),
+                             [self = shared_from_this(), name](error_code code, const cles::json_text& reply) {
+                                 self->take(name, code ? std::string{} : reply.text);
+                             });
+        }
+        if (open_ == 0) {
+            on_replies(std::move(told_));
+        }
+    }
+    void take(const std::string& name, const std::string& text) {
+        --open_;
+        bytes_ += text.size();
+        if (!text.empty() && bytes_ <= most_told_by_all) { // else it is left out
+            told_.emplace(name, text);
+        }
+        if (is_wanted()) {
+            ask_next();
+        }
+    }
+
+    cles::service& node_;
+    std::string path_;
+    std::set<std::string> left_; // to be asked
+    std::size_t open_ = 0;       // that are asked
+    std::size_t bytes_ = 0;
+    std::map<std::string, std::string> told_;
+    std::chrono::steady_clock::time_point end_{};
+};
+
+class metrics_exchange final : public fleet_exchange {
+  public:
+    metrics_exchange(std::shared_ptr<response_sink> to, asked asked_for, cles::service& node, metrics_format format)
+        : fleet_exchange(std::move(to), std::move(asked_for), node, "cles/metrics"), format_(format) {}
+
+  private:
+    void on_replies(std::map<std::string, std::string> told) override {
+        respond(metrics_text(told, format_), type_of(format_));
+    }
+
+    metrics_format format_;
+};
+
+class openapi_exchange final : public fleet_exchange {
+  public:
+    openapi_exchange(std::shared_ptr<response_sink> to, asked asked_for, cles::service& node, type_cache& known)
+        : fleet_exchange(std::move(to), std::move(asked_for), node, "cles"), known_(known) {}
+
+  private:
+    void on_replies(std::map<std::string, std::string> told) override {
+        until_ = std::chrono::steady_clock::now() + patience_with_types;
+        auto self = std::static_pointer_cast<openapi_exchange>(shared_from_this());
+        asio::co_spawn(node().get_executor(), run(std::move(self), offering_nodes(told)), asio::detached);
+    }
+
+    static asio::awaitable<void> run(std::shared_ptr<openapi_exchange> self, std::vector<offering_node> nodes) {
         for (auto& node : nodes) {
             co_await self->ask_for_types(node);
         }
@@ -362,26 +421,25 @@ class openapi_exchange final : public client_exchange, public std::enable_shared
         }
     }
 
-    // The node of the gateway is not there any more if nobody wants the response.
-    asio::awaitable<void> ask_for_types(offering_node& node) {
+    asio::awaitable<void> ask_for_types(offering_node& of) {
         std::set<std::string> tasks;
-        for (const auto& each : node.tasks) {
+        for (const auto& each : of.tasks) {
             tasks.insert(each.task);
         }
         for (const auto& task : tasks) {
-            const bool is_late = std::chrono::steady_clock::now() > end_;
-            if (node.types.empty() || !is_wanted() || is_late || told_ > most_types_at_once) {
+            const bool is_late = std::chrono::steady_clock::now() > until_;
+            if (of.types.empty() || !is_wanted() || is_late || told_ > most_types_at_once) {
                 co_return;
             }
-            const auto key = what().who.name + " " + node.name + " " + node.types + " " + task;
+            const auto key = what().who.name + " " + of.name + " " + of.types + " " + task;
             std::string told;
             if (const auto* const known = known_.find(key)) {
                 told = *known;
             } else {
-                const auto noun = node.name + ":cles/types/" + task;
+                const auto noun = of.name + ":cles/types/" + task;
                 const auto chosen = options(patience_with_one);
                 try {
-                    const cles::json_text reply = co_await node_.async_pull(noun, chosen);
+                    const cles::json_text reply = co_await node().async_pull(noun, chosen);
                     told = reply.text;
                 } catch (const cles::error&) { // it may not be asked, or is gone
                     continue;
@@ -393,15 +451,14 @@ class openapi_exchange final : public client_exchange, public std::enable_shared
             }
             if (told.size() <= most_types_of_task) {
                 told_ += told.size();
-                add_schemas(node, task, told);
+                add_schemas(of, task, told);
             }
         }
     }
 
-    cles::service& node_;
     type_cache& known_;
     std::size_t told_ = 0; // bytes
-    std::chrono::steady_clock::time_point end_ = std::chrono::steady_clock::now() + patience_with_types;
+    std::chrono::steady_clock::time_point until_{};
 };
 
 } // namespace
@@ -445,8 +502,8 @@ std::shared_ptr<exchange> begin_binding(cles::service& node, std::shared_ptr<res
 
 std::shared_ptr<exchange> begin_metrics(cles::service& node, std::shared_ptr<response_sink> to, asked what,
                                         metrics_format format) {
-    auto made = std::make_shared<metrics_exchange>(std::move(to), std::move(what));
-    made->start(node, format);
+    auto made = std::make_shared<metrics_exchange>(std::move(to), std::move(what), node, format);
+    made->start();
     return made;
 }
 

@@ -168,9 +168,9 @@ std::vector<offered_task> usable_tasks(std::vector<offered_task> told) {
 
 } // namespace
 
-std::vector<offering_node> offering_nodes(std::string_view reply) {
+std::vector<offering_node> offering_nodes(const std::map<std::string, std::string>& replies) {
     std::vector<offering_node> found;
-    for (const auto& [name, json] : results_of_all(reply)) {
+    for (const auto& [name, json] : replies) {
         described_node read;
         if (is_node_or_task(name) && cles::from_json(json, read) && read.tasks) {
             auto types = read.types.value_or(std::string{});

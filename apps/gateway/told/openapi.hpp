@@ -28,8 +28,8 @@ struct offering_node {
     std::map<std::pair<std::string, std::string>, cles::task_schemas> schemas{}; ///< by verb and task
 };
 
-/// The nodes in the reply to `PULL all:cles`. Those whose description cannot be read are left out.
-std::vector<offering_node> offering_nodes(std::string_view reply);
+/// The nodes that have replied to `PULL NODE:cles`, by name. Those whose description cannot be read are left out.
+std::vector<offering_node> offering_nodes(const std::map<std::string, std::string>& replies);
 /// Adds what the reply to `PULL NODE:cles/types/<task>` tells; what cannot be read is left out.
 void add_schemas(offering_node& node, const std::string& task, std::string_view reply);
 
