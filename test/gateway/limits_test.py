@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: BSL-1.0
 """What hostile clients send: others are served meanwhile, and nothing grows."""
 
+import json
+import socket
 import unittest
 
-from gateway_support import Gateway, read_all
+from gateway_support import FakeNodes, Gateway, own_group, read_all
 from support import wait_until
 
 
@@ -42,6 +44,29 @@ class Limits(unittest.TestCase):
                     client.sendall(requests)
         self.assertEqual(gateway.get("/pull/self/cles").status, 200)
         self.assertGreaterEqual(gateway.counted("connections_evicted"), 1)
+
+    def test_responses_that_nobody_reads_have_a_limit_together(self):
+        env = own_group()
+        gateway = Gateway(env=env)
+        self.addCleanup(lambda: self.assertEqual(gateway.stop(), 0))
+        nodes = FakeNodes(env, ["fake1"], '{"more":"' + "x" * (7 << 20) + '"}')
+        self.addCleanup(nodes.close)
+        wait_until(lambda: gateway.ask("GET", "/pull/fake1/cles").status == 200, "it is known")
+        clients = []
+        for number in range(9):
+            client = socket.socket()
+            self.addCleanup(client.close)
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # so that it waits in the gateway
+            client.connect(("127.0.0.1", gateway.port))
+            client.sendall(b"GET /pull/fake1/cles HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            self.assertTrue(client.recv(12, socket.MSG_WAITALL).endswith(b" 200"), number)
+            clients.append(client)
+        refused = gateway.get("/pull/fake1/cles")
+        self.assertEqual((refused.status, json.loads(refused.body)["error"], refused.headers["Retry-After"]), (503, "busy", "1"))
+        self.assertTrue(json.loads(gateway.post("/push/fake1/cles2").body)["ran"])
+        self.assertEqual(gateway.get("/pull/self/cles").status, 200)
+        clients[0].close()
+        wait_until(lambda: gateway.get("/pull/fake1/cles").status == 200, "there is room again")
 
     def test_an_address_has_a_limit(self):
         gateway = self.start("--connections", "100", "--connections-per-address", "4")

@@ -35,6 +35,7 @@ void connection::close() {
     set_phase(phase::closed);
     timer_.cancel();
     stream_->close();
+    release();
     if (const auto served = std::exchange(exchange_, nullptr)) {
         served->cancel();
     }
@@ -186,10 +187,21 @@ void connection::respond(const http_response& response) {
     if (phase_ != phase::serving) {
         return;
     }
+    if (!has_room(response.body.size())) {
+        std::string why = R"({"error":"busy","message":"too much waits for clients that read slowly","retry_ms":1000)";
+        why.append(reader_.request().method == "GET" ? "}" : R"(,"ran":true})");
+        respond(response_to_failure(cles::errc::busy, {}, why, response.fields));
+        return;
+    }
     count(response.status);
     exchange_.reset();
     set_phase(phase::ending);
     put(to_text(response, keeps_alive_, reader_.request().method != "HEAD"));
+}
+
+// Small ones always have: otherwise clients that do not read would shut others out.
+bool connection::has_room(std::size_t size) const noexcept {
+    return size <= most_at_once || counts_.unwritten + size <= most_unwritten;
 }
 
 void connection::begin_events(const header_fields& fields) {
@@ -205,8 +217,10 @@ void connection::begin_events(const header_fields& fields) {
 }
 
 void connection::send(std::string_view events) {
-    if (phase_ == phase::streaming) {
+    if (phase_ == phase::streaming && has_room(events.size())) {
         put(events);
+    } else if (phase_ == phase::streaming) {
+        on_gone(); // it cannot be told what it asks for
     }
 }
 
@@ -223,7 +237,17 @@ void connection::end_events() {
 
 void connection::put(std::string_view text) {
     waiting_.append(text);
+    held_ += text.size();
+    counts_.unwritten += text.size();
     write();
+}
+
+// All has been written, or will not be.
+void connection::release() {
+    counts_.unwritten -= std::exchange(held_, 0);
+    if (waiting_.capacity() > most_at_once) {
+        waiting_ = std::string{};
+    }
 }
 
 void connection::write() {
@@ -236,6 +260,7 @@ void connection::write() {
         written_ = 0;
     }
     if (output_.empty()) {
+        release();
         on_all_written();
         return;
     }

@@ -65,7 +65,9 @@ class connection final : public response_sink, public std::enable_shared_from_th
     void on_read(boost::system::error_code code, std::size_t size);
     void advance();
     void begin();
+    [[nodiscard]] bool has_room(std::size_t size) const noexcept;
     void put(std::string_view text);
+    void release();
     void write();
     void on_written(boost::system::error_code code);
     void on_all_written();
@@ -78,6 +80,7 @@ class connection final : public response_sink, public std::enable_shared_from_th
 
     static constexpr std::size_t most_unread = 65'536; ///< of requests that follow the one that is served
     static constexpr std::size_t most_at_once = 65'536;
+    static constexpr std::size_t most_unwritten = 64U << 20U; ///< of all clients
 
     std::unique_ptr<client_stream> stream_;
     request_handler& handler_;
@@ -96,7 +99,8 @@ class connection final : public response_sink, public std::enable_shared_from_th
     std::array<char, 16'384> input_{};
     std::string output_; // being written
     std::size_t written_ = 0;
-    std::string waiting_; // follows it
+    std::string waiting_;  // follows it
+    std::size_t held_ = 0; // of both
 };
 
 } // namespace gateway

@@ -5,6 +5,7 @@
 
 #include <boost/describe/class.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -29,6 +30,8 @@ struct gateway_counts {
     std::uint64_t timeouts = 0;
     std::uint64_t spans_sent = 0;
     std::uint64_t spans_dropped = 0;
+    /// Bytes that wait for all clients; no metric.
+    std::size_t unwritten = 0;
 };
 BOOST_DESCRIBE_STRUCT(gateway_counts, (),
                       (connections_open, connections_accepted, connections_refused, connections_evicted, streams_open,
