@@ -6,11 +6,16 @@
 
 #include <boost/describe/class.hpp>
 
+#include <chrono>
 #include <cstdio>
 #include <map>
 #include <string>
 
 namespace dsgd {
+
+/// How often a manager looks whether nodes are late, and how many times as seldom for nodes that have come.
+inline constexpr std::chrono::milliseconds watch_interval{20};
+inline constexpr int peers_every = 10;
 
 struct refusal {
     std::string error{}, message{};

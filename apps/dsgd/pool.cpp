@@ -22,10 +22,6 @@ namespace dsgd {
 
 using steady = std::chrono::steady_clock;
 
-// How often it looks for late shards, and how many times as seldom for nodes that have come.
-constexpr std::chrono::milliseconds watch_interval{20};
-constexpr int peers_every = 10;
-
 struct pool::round {
     board& all;
     const char* what;

@@ -14,14 +14,14 @@
 namespace dsgd {
 namespace {
 
-struct arguments {
+struct neighbours_arguments {
     participant::options node{.listen = "tcp://127.0.0.1:0"};
     std::vector<std::string> files{};
     double patience_s = 10;
     training_arguments training{};
 };
 
-int run(const arguments& args) {
+int train_with_neighbours(const neighbours_arguments& args) {
     const auto& training = args.training;
     const auto test = digits::image_set::read({training.test});
     const auto images = digits::image_set::read(args.files);
@@ -42,7 +42,7 @@ int run(const arguments& args) {
 } // namespace
 
 void add_neighbours_command(CLI::App& to, std::function<int()>& chosen) {
-    const auto args = std::make_shared<arguments>();
+    const auto args = std::make_shared<neighbours_arguments>();
     auto& node = args->node;
     auto* command = to.add_subcommand(
         "neighbours", "Is a node that trains a network on images of its own, and averages with its neighbours, without "
@@ -68,7 +68,7 @@ void add_neighbours_command(CLI::App& to, std::function<int()>& chosen) {
                      "How long it waits for a neighbour that was never there, in "
                      "seconds (10)")
         ->check(CLI::Range(0.0, 86'400.0));
-    command->final_callback([args, &chosen] { chosen = [args] { return run(*args); }; });
+    command->final_callback([args, &chosen] { chosen = [args] { return train_with_neighbours(*args); }; });
 }
 
 } // namespace dsgd

@@ -15,14 +15,14 @@
 namespace dsgd {
 namespace {
 
-struct arguments {
+struct rounds_arguments {
     std::vector<std::string> seeds{"tcp://127.0.0.1:25370"}, nodes{}, local{};
     std::uint64_t deadline_s = 60;
     training_arguments training{};
 };
 
 // One thread without CLES: what rounds are to be measured by. The time of evaluations does not count.
-int run_here(const arguments& args, const digits::image_set& test) {
+int train_here(const rounds_arguments& args, const digits::image_set& test) {
     const auto images = digits::image_set::read(args.local);
     test.check_kind(images);
     const auto& training = args.training;
@@ -50,10 +50,10 @@ int run_here(const arguments& args, const digits::image_set& test) {
     return report.finish({}, 0);
 }
 
-int run(const arguments& args) {
+int train_in_rounds(const rounds_arguments& args) {
     const auto test = digits::image_set::read({args.training.test});
     if (!args.local.empty()) {
-        return run_here(args, test);
+        return train_here(args, test);
     }
     trainers nodes{args.seeds, args.nodes, std::chrono::seconds{args.deadline_s}};
     nodes.find(test.header().pixels, test.header().classes);
@@ -69,7 +69,7 @@ int run(const arguments& args) {
 } // namespace
 
 void add_rounds_command(CLI::App& to, std::function<int()>& chosen) {
-    const auto args = std::make_shared<arguments>();
+    const auto args = std::make_shared<rounds_arguments>();
     auto* command = to.add_subcommand(
         "rounds", "Trains a network on images that stay in the files of their nodes: averages what they have learned, "
                   "round by round");
@@ -88,7 +88,7 @@ void add_rounds_command(CLI::App& to, std::function<int()>& chosen) {
     for (auto* of_nodes : {at, nodes, deadline}) {
         local->excludes(of_nodes);
     }
-    command->final_callback([args, &chosen] { chosen = [args] { return run(*args); }; });
+    command->final_callback([args, &chosen] { chosen = [args] { return train_in_rounds(*args); }; });
 }
 
 } // namespace dsgd

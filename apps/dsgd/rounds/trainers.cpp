@@ -22,9 +22,6 @@ namespace {
 
 using steady = std::chrono::steady_clock;
 
-// How often it looks whether nodes are late, and how many times as seldom for nodes that have come.
-constexpr std::chrono::milliseconds watch_interval{20};
-constexpr int peers_every = 10;
 constexpr std::chrono::milliseconds busy_pause{20};
 
 } // namespace
