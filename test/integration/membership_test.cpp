@@ -19,9 +19,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 BOOST_AUTO_TEST_SUITE(membership)
@@ -444,6 +447,24 @@ BOOST_FIXTURE_TEST_CASE(past_the_limit_nodes_are_passed_over, fixture) {
     }
     until([&] { return pulled(asker, "self:cles/metrics").text.find(R"("peers_refused":3)") != std::string::npos; });
     BOOST_TEST(asker.peers().size() == 2U);
+}
+
+BOOST_FIXTURE_TEST_CASE(made_up_nodes_do_not_fill_the_log, fixture) {
+    std::size_t lines = 0;
+    auto options = in_group("asker");
+    options.limits.peers = 4;
+    options.log = [&](cles::log_level, std::string_view text) {
+        lines += text.starts_with("discovered ") || text.ends_with(" has left") ? 1U : 0U;
+    };
+    cles::service asker{here, std::move(options)};
+    speaker many{here, where};
+    for (int i = 0; i < 20; ++i) {
+        many.announce("car" + std::to_string(i), "{}");
+        many.announce("car" + std::to_string(i), R"({"leaving":true})");
+    }
+    many.announce("last", "{}");
+    until([&] { return knows(asker, "last"); });
+    BOOST_TEST(lines == 4U);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

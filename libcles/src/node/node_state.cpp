@@ -66,27 +66,27 @@ void node_state::post_log(log_level level, std::string what, std::string peer) {
     }
 }
 
-void node_state::log_drop(std::string_view host, std::string_view what, std::string_view why, bool malformed) {
+void node_state::log_caused(const caused_line& which, const std::function<std::string()>& text) {
     if (!log) {
         return;
     }
-    const auto left_out = logged.take({.kind = malformed ? "malformed" : "dropped", .source = host}, time.now());
-    if (!left_out) {
-        return;
+    const auto left_out = logged.take({.kind = which.kind, .source = which.source, .most = which.most}, time.now());
+    if (left_out) {
+        post_log(which.level, text() + left_out_text(*left_out), std::string{which.peer});
     }
-    post_log(malformed ? log_level::warning : log_level::debug,
-             "dropped " + std::string{what} + " of " + std::string{host} + ": " + std::string{why} +
-                 left_out_text(*left_out),
-             std::string{host});
+}
+
+void node_state::log_drop(std::string_view host, std::string_view what, std::string_view why, bool malformed) {
+    log_caused(
+        {.level = malformed ? log_level::warning : log_level::debug,
+         .kind = malformed ? "malformed" : "dropped",
+         .source = host,
+         .peer = host},
+        [&] { return std::string{"dropped "}.append(what).append(" of ").append(host).append(": ").append(why); });
 }
 
 void node_state::log_denial(std::string_view source, std::string_view peer, const std::function<std::string()>& text) {
-    if (!log) {
-        return;
-    }
-    if (const auto left_out = logged.take({.kind = "denied", .source = source, .most = 8}, time.now())) {
-        post_log(log_level::info, text() + left_out_text(*left_out), std::string{peer});
-    }
+    log_caused({.level = log_level::info, .kind = "denied", .source = source, .peer = peer, .most = 8}, text);
 }
 
 } // namespace cles::core

@@ -42,6 +42,15 @@ class span_recorder;
 
 struct node_state;
 
+/// A line of the log that others can cause.
+struct caused_line {
+    log_level level = log_level::info;
+    std::string_view kind;     ///< one of a few literals
+    std::string_view source{}; ///< who has caused it: a member, or a host; empty: nobody can be named
+    std::string_view peer{};   ///< as `log_entry::peer`
+    std::uint32_t most = 1;    ///< such lines a minute
+};
+
 /// The settings of a node.
 struct node_options {
     std::string name;
@@ -118,6 +127,9 @@ struct node_state {
     void write_log(log_level level, const log_entry& what) const noexcept;
     /// The same from inside a loop over data that the log function could change.
     void post_log(log_level level, std::string what, std::string peer = {});
+    /// Logs a line that others can cause, no more often than it states for its kind and source. The text is made only
+    /// then.
+    [[gnu::cold]] void log_caused(const caused_line& which, const std::function<std::string()>& text);
     /// Logs that something of this host was dropped, once a minute for each host. `malformed`: no node should send it;
     /// anything else is told at `debug`. The text must not be of the peer.
     [[gnu::cold]] void log_drop(std::string_view host, std::string_view what, std::string_view why, bool malformed);

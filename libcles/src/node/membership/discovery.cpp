@@ -13,6 +13,7 @@
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 
 namespace cles::core {
@@ -385,44 +386,55 @@ void discovery::on_interfaces_changed(time_point now) {
     }
 }
 
-// Called from inside a loop over all nodes, so log entries are posted.
+// Called from inside a loop over all nodes, so log entries are posted. Without security, anybody can make up nodes: a
+// minute brings no more lines than nodes may be known.
 void discovery::on_peer(std::string_view node, membership::change what, std::string_view where) {
     const std::string name{node};
     const auto place =
         where.empty() ? std::string{" at no address that is reachable from here"} : " at " + std::string{where};
+    const auto note = [this](log_level level, const std::string& text) {
+        host_.node().log_caused({.level = level,
+                                 .kind = level == log_level::debug ? "nodes, in detail" : "nodes",
+                                 .most = static_cast<std::uint32_t>(host_.bounds().peers)},
+                                [&] { return text; });
+    };
+    const auto note_clash = [&](log_level level, std::string_view kind, const std::string& text) {
+        constexpr std::uint32_t most = 4;
+        host_.node().log_caused({.level = level, .kind = kind, .source = name, .most = most}, [&] { return text; });
+    };
     switch (what) {
-    case membership::change::appeared: host_.post_log(log_level::info, "discovered " + name + place); break;
+    case membership::change::appeared: note(log_level::info, "discovered " + name + place); break;
     case membership::change::moved:
-        host_.post_log(log_level::info, name + " is now" + place);
+        note(log_level::info, name + " is now" + place);
         if (group_ != nullptr) { // what was bound at its old address may have ended with it
             group_->feeds().rebind_soon(name, host_.now());
         }
         break;
-    case membership::change::silent: host_.post_log(log_level::debug, name + " is no longer received"); break;
-    case membership::change::returned: host_.post_log(log_level::debug, name + " is received again"); break;
-    case membership::change::left: host_.post_log(log_level::info, name + " has left"); break;
+    case membership::change::silent: note(log_level::debug, name + " is no longer received"); break;
+    case membership::change::returned: note(log_level::debug, name + " is received again"); break;
+    case membership::change::left: note(log_level::info, name + " has left"); break;
     case membership::change::gone:
-        host_.post_log(log_level::info, name + " is gone");
+        note(log_level::info, name + " is gone");
         if (gossip_) {
             gossip_->on_gone(node, where, host_.now());
         }
         break;
     case membership::change::relinked:
-        host_.post_log(log_level::debug, name + " states other links");
+        note(log_level::debug, name + " states other links");
         if (gossip_) {
             gossip_->reach().on_links_announced(name);
         }
         break;
     case membership::change::clash:
-        host_.post_log(log_level::warning,
-                       name == host_.node().name
-                           ? "another node also has the name '" + name + "', on " + std::string{where}
-                           : "a second node has the name '" + name + "', on " + std::string{where} +
-                                 ", and gets no requests");
+        note_clash(log_level::warning, "clash",
+                   name == host_.node().name ? "another node also has the name '" + name + "', on " + std::string{where}
+                                             : "a second node has the name '" + name + "', on " + std::string{where} +
+                                                   ", and gets no requests");
         return;
     case membership::change::taken:
-        host_.post_log(log_level::error, "the name '" + name + "' is already in use: the node at " +
-                                             std::string{where} + " had it first, and gets its requests");
+        note_clash(log_level::error, "taken",
+                   "the name '" + name + "' is already in use: the node at " + std::string{where} +
+                       " had it first, and gets its requests");
         host_.on_name_taken(std::string{where});
         return;
     }

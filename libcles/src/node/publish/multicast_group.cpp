@@ -443,7 +443,7 @@ bool multicast_group::take_announcement(const group_datagram& datagram, time_poi
     std::string why;
     if (!read_announcement(update, heard.said, why)) {
         ++counts.announcements_dropped;
-        node_->post_log(log_level::debug, "an announcement from " + host_text(heard.from) + " was dropped: " + why);
+        node_->log_drop(host_text(heard.from), "an announcement", why, false);
         return true;
     }
     if (const auto& security = node_->security) {

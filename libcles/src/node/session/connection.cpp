@@ -2,6 +2,7 @@
 #include "node/session/connection.hpp"
 
 #include "node/local_node.hpp"
+#include "node/membership/reachable_endpoints.hpp"
 #include "node/publish/feed_machine.hpp"
 #include "node/routing/peer_channels.hpp"
 #include "node/session/request_checks.hpp"
@@ -333,9 +334,14 @@ void connection::on_stall(time_point now) {
         host_->deadlines().arm(stall_, saturating_add(now, host_->bounds().stall));
         return;
     }
-    host_->post_log(log_level::warning, "closed a link whose peer reads nothing: " + link_->peer().address,
-                    link_->peer().address);
+    log_closed(log_level::warning, "stalled", "closed a link whose peer reads nothing");
     abandon("the peer read nothing for too long");
+}
+
+void connection::log_closed(log_level level, std::string_view kind, std::string_view what) {
+    const auto& peer = link_->peer();
+    host_->node().log_caused({.level = level, .kind = kind, .source = holder_of(peer), .peer = peer.address},
+                             [&] { return std::string{what}.append(": ").append(peer.address); });
 }
 
 void connection::on_silence() {
@@ -344,8 +350,7 @@ void connection::on_silence() {
         abandon("nothing was received for too long");
         return;
     }
-    host_->post_log(log_level::debug, "closed a link on which no line was received: " + link_->peer().address,
-                    link_->peer().address);
+    log_closed(log_level::debug, "silent", "closed a link on which no line was received");
     close_after_flush("no line was received in time");
 }
 

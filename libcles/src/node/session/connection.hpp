@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/line_link.hpp>
+#include <cles/log.hpp>
 
 #include "node/base/peer_reply.hpp"
 #include "node/flush_scheduler.hpp"
@@ -14,6 +15,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace cles::core {
@@ -143,6 +145,8 @@ class connection final : public link_events,
     void tell_waiting(const peer_answer& found);
 
     [[gnu::cold]] void on_stall(time_point now);
+    /// \param kind as `caused_line::kind`
+    [[gnu::cold]] void log_closed(log_level level, std::string_view kind, std::string_view what);
     void schedule_buffer_release();
     [[gnu::cold]] void on_idle(time_point now);
     void send_output();

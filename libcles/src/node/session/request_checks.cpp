@@ -201,16 +201,24 @@ protocol::failure no_passage(node_state& n, passage why, const request_origin& b
     return failure;
 }
 
-bool allows(const node_state& n, const identity& peer, const protocol::request_line& r) {
+bool allows(node_state& n, const identity& peer, const protocol::request_line& r) {
     if (n.security && !is_permitted(n, peer, r)) {
         return false;
     }
     if (!n.authorise) {
         return true;
     }
-    const auto log_error = [&](std::string_view why) {
+    const auto log_error = [&](const std::string& why) {
+        constexpr std::uint32_t most = 8;
+        const auto source = peer.name.empty() ? holder_of(peer) : peer.name;
+        const auto left_out =
+            n.log ? n.logged.take({.kind = "rules", .source = source, .most = most}, n.time.now()) : std::nullopt;
+        if (!left_out) {
+            return;
+        }
+        const auto text = why + left_out_text(*left_out);
         const auto trace = r.trace ? protocol::trace_id_text(r.trace.id) : std::string{};
-        n.write_log(log_level::error, {why, peer.address, r.id, trace});
+        n.write_log(log_level::error, {text, peer.address, r.id, trace});
     };
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);

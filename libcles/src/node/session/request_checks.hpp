@@ -88,7 +88,7 @@ bool may_forward_for(const node_state& n, std::string_view requester);
 [[gnu::cold]] std::string how_to_permit_forwarding(std::string_view forwarder, std::string_view requester);
 
 /// Whether the access rules allow the request.
-bool allows(const node_state& n, const identity& peer, const protocol::request_line& request);
+bool allows(node_state& n, const identity& peer, const protocol::request_line& request);
 
 /// Logs that a request was denied: who may not learns of it by the reply; who operates this node, by the log.
 [[gnu::cold]] void log_denial(node_state& n, const identity& peer, const protocol::request_line& request,

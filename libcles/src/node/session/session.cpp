@@ -72,7 +72,9 @@ void session::on_line(std::string_view line, time_point now) {
         if (out_.is_datagram()) { // web pages cannot send datagrams
             return;
         }
-        node_->write_log(log_level::warning, {"rejected a web client: " + peer_.address, peer_.address});
+        node_->log_caused(
+            {.level = log_level::warning, .kind = "web", .source = holder_of(peer_), .peer = peer_.address},
+            [this] { return "rejected a web client: " + peer_.address; });
         on_lost("the peer speaks HTTP");
         out_.close();
         return;

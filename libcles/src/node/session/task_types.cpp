@@ -61,7 +61,7 @@ void serve_types(node_state& host, reply_writer& replies, const protocol::reques
 }
 
 // Whether that peer may bind the noun: what decides about a BIND decides here, too.
-bool may_bind(const node_state& host, const identity& peer, const protocol::request_line& r, const std::string& path) {
+bool may_bind(node_state& host, const identity& peer, const protocol::request_line& r, const std::string& path) {
     const auto whole = "self:" + path;
     std::string why;
     auto asked = r;

@@ -4,6 +4,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <stdexcept>
@@ -64,6 +65,19 @@ BOOST_AUTO_TEST_CASE(rules_that_throw_deny_access) {
         BOOST_TEST(link.kind("PULL car1:speed id=7") == "id=7 denied");
         BOOST_TEST(link.kind("PULL car1:speed") == "denied");
     }
+}
+
+BOOST_AUTO_TEST_CASE(rules_that_throw_do_not_fill_the_log) {
+    std::size_t errors = 0;
+    cles::test::test_node node{
+        {},
+        [](const cles::access&) -> bool { throw 7; },
+        [&](cles::log_level level, const cles::log_entry&) { errors += level == cles::log_level::error ? 1U : 0U; }};
+    cles::test::test_link link{node};
+    for (int i = 0; i < 20; ++i) {
+        BOOST_TEST(link.kind("PULL car1:speed id=7") == "id=7 denied");
+    }
+    BOOST_TEST(errors == 8U);
 }
 
 BOOST_AUTO_TEST_CASE(a_node_finds_itself_in_via_by_its_whole_name) {

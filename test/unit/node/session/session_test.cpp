@@ -156,6 +156,23 @@ BOOST_AUTO_TEST_CASE(http_closes_the_link_without_a_reply) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(web_clients_do_not_fill_the_log) {
+    std::vector<std::string> logged;
+    cles::test::test_node hearing{
+        {}, {}, [&](cles::log_level, const cles::log_entry& entry) { logged.emplace_back(entry.text); }};
+    const auto come = [&](int clients) {
+        for (int i = 0; i < clients; ++i) {
+            cles::test::test_link{hearing}.ask("GET / HTTP/1.1");
+        }
+    };
+    come(20);
+    BOOST_TEST(logged == (std::vector<std::string>{"rejected a web client: tcp://127.0.0.1:1"}),
+               boost::test_tools::per_element());
+    hearing.clock.advance(std::chrono::minutes{1});
+    come(1);
+    BOOST_TEST(logged.back() == "rejected a web client: tcp://127.0.0.1:1 (and 19 since the last such line)");
+}
+
 BOOST_AUTO_TEST_CASE(a_datagram_with_http_is_not_answered) {
     const std::string head =
         "GET / HTTP/1.1\r\nHost: 127.0.0.1:25370\r\nUser-Agent: curl/7.88.1\r\nAccept: */*\r\n\r\n";
