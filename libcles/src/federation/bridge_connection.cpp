@@ -3,12 +3,11 @@
 
 #include "federation/carried_line.hpp"
 
-#include <chrono>
+#include <string>
 
 namespace cles::bridging {
 namespace {
 
-constexpr std::chrono::minutes between_drop_logs{1};
 constexpr std::size_t max_short = 1024; // of a failure for which room is reserved
 
 } // namespace
@@ -58,10 +57,9 @@ void bridge_connection::send_cancel(const bridge_id& to, std::uint64_t number) {
 
 void bridge_connection::drop(const received_message& m, std::string_view why) {
     ++counts_.messages_refused;
-    if (next_drop_log_ <= m.at) {
-        next_drop_log_ = m.at + between_drop_logs;
+    if (const auto left_out = dropped_.take({.kind = "dropped", .source = m.by.member}, m.at)) {
         out_.log(log_level::warning, "dropped a message of NATS on " + std::string{m.where.substr(0, 256)} + ": " +
-                                         std::string{why} + " (logged once a minute)");
+                                         std::string{why} + core::left_out_text(*left_out));
     }
 }
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/limits.hpp>
-
 #include "federation/bridge_output.hpp"
 #include "federation/received_message.hpp"
 #include "federation/subject.hpp"
+#include "port/log_budget.hpp"
 #include "protocol/reply_line.hpp"
 
 #include <cstddef>
@@ -66,7 +65,7 @@ class bridge_connection {
     bridge_output& out_;
     std::size_t max_message_ = 0;
     bool is_open_ = false;
-    time_point next_drop_log_{};
+    core::log_budget dropped_; // by the member that has sealed the message, if one has
     bridge_figures counts_;
 };
 
