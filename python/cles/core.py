@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 from . import grammar, jsontext
@@ -38,12 +38,14 @@ class Peer:
 
 @dataclass(frozen=True, slots=True)
 class Access:
-    """A request whose access is to be decided. If `peer` has forwarded it, `requester` is whose request it is."""
+    """A request whose access is to be decided. In a secured fleet, `requester` is the member whose request it is. If another
+    member has forwarded it, which is then the peer, `forwarded_by` is its name."""
 
     peer: Peer
     verb: Verb
     noun: grammar.Noun
     requester: str = ""
+    forwarded_by: str = ""
 
 
 @dataclass(slots=True)
@@ -116,6 +118,14 @@ class Core:
     def can_bind(self, task: str) -> bool:
         verbs = self.tasks.get(task, {})
         return "BIND" in verbs or "UPDATE" in verbs or task in self.opened or self.topics.knows(task)
+
+    def access(self, peer: Peer, request: Request) -> Access:
+        """Who asks for what. Without security, nobody has proved a name."""
+        asked = Access(peer, request.verb, request.noun)
+        if self.security is None:
+            return asked
+        return replace(asked, requester=self.security.requester(peer, request),
+                       forwarded_by=peer.name if request.sender else "")
 
     def publish(self, path: str, body: str) -> None:
         self.topics.publish(path, body, self.now())

@@ -62,6 +62,11 @@ class Request:
         return self._call.requester
 
     @property
+    def forwarded_by(self) -> str:
+        """In a secured fleet, the member that has forwarded it for the requester: the peer. Otherwise empty."""
+        return self._call.forwarded_by
+
+    @property
     def seconds_left(self) -> float:
         return max(self._call.due - self._core.now(), 0) / 1e9
 

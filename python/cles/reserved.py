@@ -7,7 +7,7 @@ import re
 from typing import Any
 
 from . import grammar, jsontext
-from .core import Access, Core, Peer
+from .core import Core, Peer
 from .errors import Error, RefusedError
 from .grammar import Request
 
@@ -83,7 +83,7 @@ class Reserved:
             r = Request("BIND", grammar.parse_noun(f"self:{path}"), sender=asked.sender)
             if core.security is not None and core.security.refusal(peer, r) is not None:
                 continue
-            if core.authorise is not None and not core.authorise(Access(peer, "BIND", r.noun)):
+            if core.authorise is not None and not core.authorise(core.access(peer, r)):
                 continue
             size += len(path) + 3
             if size > self._longest:

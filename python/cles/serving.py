@@ -36,16 +36,17 @@ def failure_text(error: Error, node: str) -> str:
 class Call:
     """A request that a handler has received. It ends once: with `done` or `fail`, or because it is withdrawn."""
 
-    __slots__ = ("_arrived", "_began", "_memory", "_on_stop", "_owner", "_reported", "_span", "_timer", "due", "request",
-                 "requester", "stopped", "trace", "value")
+    __slots__ = ("_arrived", "_began", "_memory", "_on_stop", "_owner", "_reported", "_span", "_timer", "due", "forwarded_by",
+                 "request", "requester", "stopped", "trace", "value")
 
-    def __init__(self, owner: Serving, request: Request, value: Any, due: int, trace: Trace | None, requester: str) -> None:
+    def __init__(self, owner: Serving, request: Request, value: Any, due: int, trace: Trace | None, by: Access) -> None:
         self._owner: Serving | None = owner
         self.request = request
         self.value = value  # of the body
         self.due = due
         self.trace = trace
-        self.requester = requester
+        self.requester = by.requester
+        self.forwarded_by = by.forwarded_by
         self.stopped = False
         self._span = trace.span if trace is not None and trace.recorded else ""
         self._began = owner.core.now()
@@ -382,12 +383,9 @@ class Serving:
                 raise Error("no_task", f"{self.core.name} has no {r.verb} '{r.noun.task}'")
             if r.verb == "UPDATE" and not self.core.topics.can_publish(r.noun.path):
                 raise Error("busy", f"'{r.noun.task}' has reached its limit of nouns")
-            self._start(entry, Call(self, r, value, due, trace, self._requester(r)))
+            self._start(entry, Call(self, r, value, due, trace, self.core.access(self.peer, r)))
         except Error as error:
             self.refuse(r, error, span)
-
-    def _requester(self, r: Request) -> str:
-        return self.core.security.requester(self.peer, r) if self.core.security else ""
 
     def _check(self, r: Request) -> Any:
         """The value of the body, of a request that may be served here."""
@@ -396,7 +394,7 @@ class Serving:
             denied = core.security.refusal(self.peer, r)
             if denied is not None:
                 raise denied
-        if core.authorise is not None and not core.authorise(Access(self.peer, r.verb, r.noun, self._requester(r))):
+        if core.authorise is not None and not core.authorise(core.access(self.peer, r)):
             raise Error("denied", f"{core.name} does not allow {r.verb} {grammar.quoted(r.noun.path)}")
         if r.noun.target not in ("self", core.name):
             raise Error("no_target", f"{core.name} does not route, and cannot forward a request to "
@@ -474,7 +472,7 @@ class Serving:
         if entry is None:
             self._bind(r, span)
             return
-        call = BindCall(self, r, {}, due, trace, self._requester(r))
+        call = BindCall(self, r, {}, due, trace, self.core.access(self.peer, r))
         self._binding = [each for each in self._binding if not each[1].ended]
         self._binding.append((path, call))
         self._start(entry, call)

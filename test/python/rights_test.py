@@ -11,8 +11,11 @@ from unittest.mock import patch
 
 from cles import ed25519, fleet, grammar
 from cles.confirmation import Confirmation
+from cles.core import Core, Peer
 from cles.errors import RefusedError
 from cles.fleet import Member, Roster, key_in_certificate, may_forward, permits, read_roster
+from cles.grammar import Request
+from cles.reserved import Reserved
 from cles.rights import Rights, parse_rules
 from cles.signer import Signer
 
@@ -49,6 +52,36 @@ class Access(unittest.TestCase):
                     self.assertEqual(allowed, letter in "PX", (scenario["members"], scenario["rules"], row, noun, letter))
                     checked += 1
         self.assertGreater(checked, 1000)
+
+
+class Requesters(unittest.TestCase):
+    """Access rules of the program know requester and forwarder, whatever they are asked about."""
+
+    def setUp(self):
+        self.asked = []
+        self.core = Core("car1", lambda: 0)
+        self.core.security = SimpleNamespace(refusal=lambda peer, request: None,
+                                             requester=lambda peer, request: request.sender or peer.name)
+        self.core.authorise = lambda access: self.asked.append((access.verb, access.requester, access.forwarded_by)) or True
+        self.peer = Peer("tls", "tls://10.0.0.2", "car2")
+
+    def test_of_a_request(self):
+        for sender, expected in (("", ("car2", "")), ("car3", ("car3", "car2"))):
+            asked = self.core.access(self.peer, Request("PULL", grammar.parse_noun("car1:speed"), sender=sender))
+            self.assertEqual((asked.requester, asked.forwarded_by), expected)
+
+    def test_of_nouns_that_are_listed(self):
+        self.core.opened.add("pose")
+        self.core.publish("pose", "{}")
+        asked = Request("PULL", grammar.parse_noun("self:cles/nouns"), sender="car3")
+        told = Reserved(self.core, 1000, by_datagram=False).serve(asked, self.peer)
+        self.assertEqual(json.loads(told), {"nouns": ["pose"]})
+        self.assertEqual(self.asked, [("BIND", "car3", "car2")])
+
+    def test_nobody_has_proved_a_name_without_security(self):
+        self.core.security = None
+        asked = self.core.access(Peer("tcp", "tcp://10.0.0.2"), Request("PULL", grammar.parse_noun("car1:speed"), sender="car3"))
+        self.assertEqual((asked.requester, asked.forwarded_by), ("", ""))
 
 
 class Signatures(unittest.TestCase):

@@ -138,10 +138,10 @@ class ThroughADaemon(Secured):
     async def test_others_reach_it_by_name(self):
         async with cles.Node(listen=[f"unix://{self.scratch}/cam1.sock"], keys=self.keys("cam1"),
                              join=[f"unix://{self.scratch}/car1.sock"]) as cam:
-            cam.on_pull("who")(lambda request: [request.requester, request.peer.name])
+            cam.on_pull("who")(lambda request: [request.requester, request.forwarded_by, request.peer.name])
             cam.offer("tick")
             out = await self.good("pull", "cam1:who", "--at", self.url, "--keys", self.keys("op"), "-o", "json")
-            self.assertEqual(json.loads(out), ["op", "cam1"])
+            self.assertEqual(json.loads(out), ["op", "cam1", "cam1"])
             (self.fleet / "cam1" / "rules").write_text("deny op may pull *:who\n")
             while (await command("pull", "cam1:who", "--at", self.url, "--keys", self.keys("op")))[0] == 0:
                 await asyncio.sleep(0.1)
