@@ -3,17 +3,19 @@
 """Measures CLES and other middleware beside the hand-written exchange: the same packet asked for, an empty task, one
 publisher and many subscribers.
 
-    peers.py [--programs build/release/perf/peers] [--rounds 5] [--only NAME,...] [--spread] [--quick] [-o FILE]
+    peers.py [--programs build/release/perf/peers] [--rounds 5] [--only NAME,...] [--spread] [--awake] [--quick] [-o FILE]
 
-Prints a table of ratios and, with -o, writes JSON. All take turns, round by round, so that whatever else the machine
-does falls on all of them. Peers that are not installed or built are named with the reason. Ends with 1 where one that
-is there fails.
+Prints a table of ratios and the versions and, with -o, writes JSON. All take turns, round by round, so that whatever else
+the machine does falls on all of them. Peers that are not installed or built are named with the reason. Ends with 1 where
+one that is there fails.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import signal
+import struct
 import subprocess
 import sys
 
@@ -27,6 +29,14 @@ LONGEST_RUN_S = 300
 
 class Failure(Exception):
     """A program exists, but failed."""
+
+
+@contextlib.contextmanager
+def cores_awake():
+    """While it lasts, the system lets no core sleep, whatever runs on it (PM Quality of Service of the kernel)."""
+    with open("/dev/cpu_dma_latency", "wb", buffering=0) as limit:
+        limit.write(struct.pack("i", 0))
+        yield
 
 
 def program_of(folder, peer):
@@ -110,6 +120,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--only", type=lambda text: text.split(","), default=[], help="these peers, separated by commas")
     parser.add_argument("--spread", action="store_true", help="let all ends run on all cores, instead of one core each")
+    parser.add_argument("--awake", action="store_true", help="let no core sleep meanwhile; requires root")
     parser.add_argument("--quick", action="store_true", help="one short round: shows that it works, not how fast")
     parser.add_argument("-o", "--output", help="write JSON there; - is the standard output, and no table then")
     options = parser.parse_args()
@@ -125,14 +136,25 @@ def main():
               file=sys.stderr)
         return 77
     before = machine()  # before anything runs
-    runs, about, failed = measure(options.programs, present, skipped, options)
+    try:
+        with cores_awake() if options.awake else contextlib.nullcontext():
+            runs, about, failed = measure(options.programs, present, skipped, options)
+    except OSError as error:
+        if error.filename != "/dev/cpu_dma_latency":
+            raise
+        print(f"peers.py: cannot keep the cores awake: {error}", file=sys.stderr)
+        return 2
     rows = rows_of(runs, about)
-    result = {"title": "CLES beside other middleware, in ratios to a hand-written exchange over TCP",
+    result = {"title": "CLES beside other middleware, in ratios to a hand-written exchange over TCP"
+                       + (", with cores kept awake" if options.awake else ""),
               "command": command("perf/evaluation/peers.py"), "machine": before, "date": date(),
-              "rounds": options.rounds, "quick": options.quick, "spread": options.spread,
+              "rounds": options.rounds, "quick": options.quick, "spread": options.spread, "awake": options.awake,
               "skipped": skipped, "rows": rows}
     if options.output != "-":
         print("\n".join(table_of(rows)))
+        for peer, said in about.items():
+            if isinstance(said, dict):
+                print(f"{peer}: {said['version']}; {said['settings']}")
         for each in skipped:
             print(f"without {each['name']}: {each['reason']}")
     if options.output:

@@ -16,6 +16,7 @@ PEERS = [
     ("coap", ["udp"]),
     ("mqtt", ["tcp"]),
     ("redis", ["unix", "tcp"]),
+    ("nats", ["tcp"]),
 ]
 
 # name -> the arguments that measure it, without the carrier; (count, count with --quick)

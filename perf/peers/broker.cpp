@@ -5,7 +5,10 @@
 #include "perf/support/descriptor.hpp"
 #include "perf/support/pinning.hpp"
 
+#include <array>
+#include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -72,6 +75,19 @@ std::uint16_t free_port(int kind_of_socket) {
     checked(::bind(probe.get(), generic, length), "bind");
     checked(::getsockname(probe.get(), generic, &length), "getsockname");
     return ntohs(address.sin_port);
+}
+
+std::string first_line_of(const std::string& command) {
+    struct closing {
+        void operator()(std::FILE* output) const noexcept { ::pclose(output); }
+    };
+    const std::unique_ptr<std::FILE, closing> output{::popen((command + " 2>/dev/null").c_str(), "re")};
+    std::array<char, 256> line{};
+    if (!output || std::fgets(line.data(), static_cast<int>(line.size()), output.get()) == nullptr) {
+        return "no " + command.substr(0, command.find(' '));
+    }
+    std::string found{line.data()};
+    return found.substr(0, found.find('\n'));
 }
 
 } // namespace cles::perf::peers

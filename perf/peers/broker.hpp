@@ -35,4 +35,8 @@ class broker {
 /// A port of the loopback interface that is free now, for programs that do not report the one that the system chose.
 std::uint16_t free_port(int kind_of_socket);
 
+/// The first line that a program prints, such as the version of a broker; "no PROGRAM" if it is not installed.
+/// \param command as a shell reads it
+std::string first_line_of(const std::string& command);
+
 } // namespace cles::perf::peers

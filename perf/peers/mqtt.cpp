@@ -249,7 +249,8 @@ std::string version() {
     int minor = 0;
     int patch = 0;
     ::mosquitto_lib_version(&major, &minor, &patch);
-    return std::to_string(major) + '.' + std::to_string(minor) + '.' + std::to_string(patch);
+    return "libmosquitto " + std::to_string(major) + '.' + std::to_string(minor) + '.' + std::to_string(patch) + ", " +
+           first_line_of("/usr/sbin/mosquitto -h");
 }
 
 std::unique_ptr<peer> make_peer(std::string_view) { return std::make_unique<mqtt>(); }

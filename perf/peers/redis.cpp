@@ -260,7 +260,7 @@ const description about{
 
 std::string version() {
     return "hiredis " + std::to_string(HIREDIS_MAJOR) + '.' + std::to_string(HIREDIS_MINOR) + '.' +
-           std::to_string(HIREDIS_PATCH);
+           std::to_string(HIREDIS_PATCH) + ", " + first_line_of("/usr/bin/redis-server --version");
 }
 
 std::unique_ptr<peer> make_peer(std::string_view carrier) { return std::make_unique<redis>(carrier); }

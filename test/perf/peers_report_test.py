@@ -154,6 +154,7 @@ class Report(unittest.TestCase):
         self.assertIn(f"{own:.1f} us", lines[1])
         self.assertIn(" 1.00 ", lines[2])
         self.assertEqual(sum(line.startswith("zeromq ") for line in lines), 2)
+        self.assertIn("zeromq: 7; as recorded", lines)
 
     def test_without_any_program_it_says_how_to_build_them(self):
         done = self.run_peers()
