@@ -67,7 +67,7 @@ class member_node : public std::enable_shared_from_this<member_node> {
     static cles::service_options options_of(const std::string& fleet, const std::string& name,
                                             const std::string& node) {
         cles::service_options made{.name = name};
-        made.peers = {{"node", node}};
+        made.peers.emplace("node", node);
         made.security = cles::secured(fleet + "/" + name);
         return made;
     }
@@ -81,7 +81,7 @@ class started_members {
         : fleet_(std::move(fleet)), node_(std::move(node)), end_(steady::now() + span) {
         for (std::size_t i = 0; i < members; ++i) {
             timers_.push_back(std::make_unique<boost::asio::steady_timer>(io_));
-            wait(i, steady::now() + between * i / members);
+            wait(i, steady::now() + between * static_cast<int>(i) / static_cast<int>(members));
         }
     }
 

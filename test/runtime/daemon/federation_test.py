@@ -6,6 +6,7 @@ import json
 import signal
 import time
 import unittest
+from collections import Counter
 from pathlib import Path
 
 from bridges import BridgesTest, pool_of
@@ -188,6 +189,25 @@ class Federation(BridgesTest):
         self.assertEqual(json.loads(hub.ask("DELEGATE north.other:once/77/0")), {"value": "other"})
         self.assertEqual(self.count_marks(77), 1)
         self.assertIsNotNone(other)
+
+    def test_a_bridge_that_leaves_loses_no_request(self):
+        """What the server has for it is answered before it ends: done, or not begun."""
+        server, hub, gate = self.two_pools()
+        self.node("other", "north", server, more=f"seeds: ['{gate.url}']\n")
+        wait_until(lambda: pool_of(hub)["bridges"] == 3, "all bridges are known")
+        outcomes = Counter()
+        with hub.connect() as link:
+            for number in range(1, 1001):
+                link.send(f"PULL north.any:prime/97 id={number} deadline=10000")
+                if number == 200:
+                    gate.send_signal(signal.SIGTERM)
+                if number > 64:
+                    outcomes[body(link.read()).get("error", "done")] += 1
+            for _ in range(64):
+                outcomes[body(link.read()).get("error", "done")] += 1
+        self.assertEqual(gate.end()[0], 0)
+        self.assertEqual(set(outcomes) - {"done", "busy"}, set(), outcomes)
+        self.assertGreater(outcomes["done"], 500, outcomes)
 
     def test_a_server_that_restarts(self):
         server, hub, gate = self.two_pools()
