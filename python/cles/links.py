@@ -520,6 +520,10 @@ class DatagramServer(asyncio.DatagramProtocol):
         else:
             (link or self._make(addr)).receive(data)
 
+    def flush(self) -> None:
+        for link in list(self.links.values()):
+            link.flush()
+
     def _refuse(self, data: bytes, addr: Any) -> None:
         core = self._host.core
         core.count("sources_refused")

@@ -191,8 +191,8 @@ class Node:
             self._run(self._stay_in_pool(pool))
 
     async def close(self, grace: float = 1.0) -> None:
-        """Shuts down in order: requests that have started may end within `grace` seconds, all others are `busy`, and each
-        peer is told that what it has no reply to has not been started."""
+        """Shuts down in order: within `grace` seconds, requests that have started may end, and subscribers get what was
+        published; all other requests are `busy`, and each peer is told that what it has no reply to has not been started."""
         if not self._started:
             return
         self.core.leaving = True
@@ -204,15 +204,22 @@ class Node:
         end = self.loop.time() + grace
         while self.core.running and self.loop.time() < end:
             await asyncio.sleep(0.01)
-        now = self.core.now()
-        self.core.topics.flush(now)
+        self.core.topics.flush(self.core.now())
+        for each in list(self._open):
+            each.flush()
+        for socket_of_datagrams in self._sockets:
+            protocol = socket_of_datagrams.get_protocol()
+            if isinstance(protocol, DatagramServer):
+                protocol.flush()
+        while self.core.topics.has_waiting() and self.loop.time() < end:  # subscribers that read slowly
+            await asyncio.sleep(0.005)
         links = [link for link in self._open if isinstance(link, StreamLink) and link.has_session]
         for link in links:
             link.session.serving.abort_running()
             link.session.asking.lose(Error("cancelled", "the node was closed"))
             link.session.send_leave_notice()
             link.flush()
-        deadline = self.loop.time() + min(self.limits.discard, 0.5)
+        deadline = max(end, self.loop.time() + min(self.limits.discard, 0.5))
         while any(link.unsent() for link in links) and self.loop.time() < deadline:
             await asyncio.sleep(0.005)
         for each in list(self._open):

@@ -105,6 +105,10 @@ class Binding:
         self._next_due = now
         self.drain(now)
 
+    def waits(self) -> bool:
+        """Whether the subscriber has not taken all yet."""
+        return bool(self._queue)
+
     def end(self) -> None:
         while self._queue:
             self._pop()
@@ -234,6 +238,9 @@ class Topics:
         for topic in self._topics.values():
             for binding in topic.bindings.values():
                 binding.flush(now)
+
+    def has_waiting(self) -> bool:
+        return any(binding.waits() for topic in self._topics.values() for binding in topic.bindings.values())
 
 
 def update_body(value: object, convert: Callable[[Any], Any]) -> str:

@@ -3,10 +3,11 @@
 """Feeds: order, gaps, restarts, a publisher that is lost and returns, slow subscribers."""
 
 import asyncio
+import socket
 import unittest
 
 import cles
-from support import AsyncTest
+from support import PATIENCE, AsyncTest
 
 
 class Publisher(AsyncTest):
@@ -56,6 +57,26 @@ class Updates(Publisher):
             thinned = await self.take(some, 2)
             self.assertEqual([(u.value, u.missed) for u in thinned], [(0, 0), (3, 0)])
         self.assertEqual(len(self.car.core.topics.find("speed").bindings), 0)
+
+    async def test_what_is_published_last_arrives_before_the_node_is_closed(self):
+        loop = asyncio.get_running_loop()
+        host, _, port = self.car.endpoints[0].removeprefix("tcp://").rpartition(":")
+        with socket.socket() as slow:
+            slow.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+            slow.setblocking(False)
+            await loop.sock_connect(slow, (host, int(port)))
+            await loop.sock_sendall(slow, b"BIND car1:speed keep=100 id=1\n")
+            await loop.sock_recv(slow, 100)
+            for n in range(500):  # more than a link takes
+                self.car.publish("speed", {"n": n, "text": "x" * 10_000})
+            closing = asyncio.create_task(self.car.close(grace=PATIENCE))
+            received = b""
+            while data := await asyncio.wait_for(loop.sock_recv(slow, 65_536), PATIENCE):
+                received += data
+            await closing
+        last, notice = received.decode().splitlines()[-2:]
+        self.assertIn('{"n":499,', last[:80])
+        self.assertEqual(notice, "PUSH self:cles/leaving reply=no")
 
     async def test_what_is_not_offered(self):
         for noun in ("car1:nothing", "car2:speed"):

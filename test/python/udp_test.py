@@ -80,6 +80,13 @@ class Served(AsyncTest):
         self.assertEqual(replies[1], "id=9 {}\n")
         self.assertIn('id=8 {"error":"cancelled"', replies[0])
 
+    async def test_what_is_published_last_arrives_before_the_node_is_closed(self):
+        self.car.offer("speed")
+        self.assertEqual(await self.sender.ask("BIND car1:speed id=1 lease=10000"), "id=1 {}\n")
+        self.car.publish("speed", "offline")
+        await self.car.close()
+        self.assertIn('{"value":"offline"}', await self.sender.receive())
+
     async def test_what_is_remembered_is_limited(self):
         self.car.limits.remembered = 4000
         for n in range(1, 4):
