@@ -24,5 +24,12 @@ def complete():
 
 
 def counted(files):
-    """{file: lines}, `#include` lines too."""
-    return {each: sum(count_lines.count((ROOT / each).read_text(encoding="utf-8")).values()) for each in files}
+    """{file: {"lines", "includes"}}, by the rule of perf/effort/count_lines.py"""
+    return {each: count_lines.count((ROOT / each).read_text(encoding="utf-8")) for each in files}
+
+
+def total(files):
+    """The lines of all, without `#include` lines and with them."""
+    counts = counted(files).values()
+    lines = sum(each["lines"] for each in counts)
+    return lines, lines + sum(each["includes"] for each in counts)

@@ -12,17 +12,19 @@ import dsgd_lines  # noqa: E402
 
 
 def main():
-    minimal, complete = dsgd_lines.counted(dsgd_lines.MINIMAL), dsgd_lines.counted(dsgd_lines.complete())
+    minimal = dsgd_lines.counted(dsgd_lines.MINIMAL)
     for name, count in minimal.items():
-        print(f"{count:4} {name}")
-    total = sum(minimal.values())
-    print(f"{total:4} source lines; less than {dsgd_lines.PAPER_LINES} are allowed")
-    print(f"{sum(complete.values()):4} with the manager that does more")
-    page = (dsgd_lines.ROOT / "docs" / "dsgd.md").read_text(encoding="utf-8")
-    missing = [words for words in (f"{total} lines", f"{sum(complete.values()):,} lines") if words not in page]
+        print(f"{count['lines']:4} and {count['includes']} #include {name}")
+    lines, with_includes = dsgd_lines.total(dsgd_lines.MINIMAL)
+    complete, complete_with_includes = dsgd_lines.total(dsgd_lines.complete())
+    print(f"{lines} source lines, {with_includes} with #include; less than {dsgd_lines.PAPER_LINES} are allowed")
+    print(f"{complete} and {complete_with_includes} with the manager that does more")
+    page = " ".join((dsgd_lines.ROOT / "docs" / "dsgd.md").read_text(encoding="utf-8").split())
+    missing = [words for words in (f"{lines} lines, {with_includes} with", f"{complete:,} lines, {complete_with_includes:,} with")
+               if words not in page]
     for words in missing:
         print(f"docs/dsgd.md does not say: {words}")
-    return 0 if all(minimal.values()) and total < dsgd_lines.PAPER_LINES and not missing else 1
+    return 0 if all(each["lines"] for each in minimal.values()) and with_includes < dsgd_lines.PAPER_LINES and not missing else 1
 
 
 if __name__ == "__main__":
