@@ -3,16 +3,18 @@
 """Measures distributed stochastic gradient descent as the paper's Table 2 does, row by row, what delegating costs, and what
 a second host gains, also by the size of the shards.
 
-    dsgd.py [--programs build/release/apps] [--runs 30] [--threads N] [--work 2300] [--epochs N] [--quota 0.5] [--quick]
+    dsgd.py [--programs build/release/apps] [--runs 30] [--threads 4] [--work 2300] [--epochs N] [--quota 0.5] [--quick]
             [-o FILE]
 
-Writes JSON. The work takes as long as the paper's: so many epochs that all threads of the first host take 2.3 s. The rows
-take turns, run by run, so that whatever else the machine does falls on all of them. The first host is this machine; the
-second is a network namespace with one of its cores and a part of that core's time, where the system allows it: the result
-says what it did not. Ends with 1 where results differ that must not.
+Writes JSON. Each host has as many threads as the paper's, and the work takes as long: so many epochs that all threads of the
+first host take 2.3 s. The rows take turns, run by run, so that whatever else the machine does falls on all of them. The first
+host is this machine; the second is a network namespace with one of its cores and a part of that core's time, where the system
+allows it: the result says what it did not. Between them is a virtual cable; two rows are repeated over a link like WiFi, which
+requires root. Ends with 1 where results differ that must not.
 """
 
 import argparse
+import contextlib
 import json
 import math
 import os
@@ -28,6 +30,7 @@ import dsgd_points
 from clean_environment import clean_environment
 from dsgd_hosts import Hosts, can_pin
 from interval import summary
+from linked_hosts import WIFI, LinkedHosts, why_not
 from provenance import command, date, machine
 from result_file import write
 
@@ -35,6 +38,7 @@ SAME_MSE = 1e-9
 MOST_EPOCHS = 1_000_000
 LEAST_STEPS = 50_000  # of a shard: with fewer, the classifier is still near its start
 SHARDS_MS = (1, 3, 10, 30, 100, 300, 1000)  # sizes for the curve, below that of the rows
+BY_WIFI = ("near_asked_by_far", "both_asked_by_far")  # the rows that are repeated
 OF_SIZES = ("local_all_near", "near_asked_by_near", "near_reduced_asked_by_far", "both_asked_by_far", "both_resplit")
 
 
@@ -170,10 +174,26 @@ def size_result(epochs, reports):
             "gain_resplit": summary([a / b for a, b in zip(alone, ms["both_resplit"])])}
 
 
+@contextlib.contextmanager
+def rows_by_wifi(programs, hosts, threads):
+    """Rows as above; none where there can be no such link, which the hosts then say."""
+    relay = os.path.join(programs, "..", "perf", "links", "cles_link_relay")
+    reason = why_not() or ("" if os.access(relay, os.X_OK) else f"there is no {relay}")
+    if reason:
+        hosts.missing.append(f"a link like WiFi ({reason}): its rows are left out")
+        yield {}
+        return
+    with LinkedHosts(relay, WIFI) as linked:
+        pair = hosts.over(linked)
+        with Daemons(programs, pair, threads) as daemons:
+            yield {f"{name}_wifi": (f"{meaning}, over a link like WiFi", *more)
+                   for name, (meaning, *more) in rows_of(pair, daemons.urls, threads).items() if name in BY_WIFI}
+
+
 def measure(programs, hosts, threads, epochs, runs, sizes):
     """The results of the rows, and of each size, which is a number of epochs."""
-    with Daemons(programs, hosts, threads) as daemons:
-        rows = rows_of(hosts, daemons.urls, threads)
+    with Daemons(programs, hosts, threads) as daemons, rows_by_wifi(programs, hosts, threads) as by_wifi:
+        rows = {**rows_of(hosts, daemons.urls, threads), **by_wifi}
         reports = rounds_of(programs, rows, epochs, runs, "Table 2")
         curve = [size_result(each, rounds_of(programs, {name: rows[name] for name in OF_SIZES}, each, max(2, runs // 2),
                                              f"size {place + 1} of {len(sizes)}")) for place, each in enumerate(sizes)]
@@ -204,7 +224,8 @@ def row_result(name, meaning, reports):
 def checks_of(rows, curve, points):
     by_name = {row["name"]: row for row in rows}
     same = [by_name[name] for name in ("local_all_near", "local_all_far", "local_all_near_reduced", "near_asked_by_near",
-                                       "near_asked_by_far", "near_reduced_asked_by_far")]
+                                       "near_asked_by_far", "near_asked_by_far_wifi", "near_reduced_asked_by_far")
+            if name in by_name]
     errors = {f"{mse:.6g}" for row in same for mse in row["mse"]}
     again = all(abs(dsgd_points.mean_squared_error(points, each) - each["mse"]) < SAME_MSE
                 for row in rows for each in row["classifiers"])
@@ -222,8 +243,11 @@ def figures_of(rows, curve, checks, hosts, threads):
                                    f"{dsgd_figures.WANTED_MSE_RATIO:g} times the least error", checks["sizes_near_least_mse"])]
 
 
-def notes(hosts, epochs):
+def notes(hosts, threads, epochs):
     yield f"The work is {epochs} steps for each of {2 * dsgd_points.PER_CLASS} points, in all rows."
+    cores = len(hosts.near.cores)
+    yield (f"Each host runs {threads} threads, or as many workers; the first host has {cores} core{'s' if cores > 1 else ''}"
+           + (", so that its threads take turns." if threads > cores else "."))
     part = f", and {hosts.quota:.0%} of its time in periods of {hosts.period_ms:g} ms" if hosts.quota else ""
     yield (f"The second host has one core{part}. " + ("In rows with both hosts, the first does not have that core."
                                                        if hosts.others != hosts.far.cores else
@@ -234,7 +258,7 @@ def main():
     parser = argparse.ArgumentParser(description="Measures distributed stochastic gradient descent (the paper's Table 2).")
     parser.add_argument("--programs", default="build/release/apps")
     parser.add_argument("--runs", type=int, default=30)
-    parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)), help="per host; default: all cores")
+    parser.add_argument("--threads", type=int, default=dsgd_figures.PAPER_THREADS, help="per host (4, as in the paper)")
     parser.add_argument("--work", type=float, default=2300, metavar="MS",
                         help="how long all threads of the first host take: the paper's take 2180 ms")
     parser.add_argument("--epochs", type=int, help="instead of as many as this takes")
@@ -260,7 +284,7 @@ def main():
                   "figures": figures_of(rows, curve, checks, hosts, options.threads), "rows": rows, "sizes": curve,
                   "checks": checks,
                   "pictured": dsgd_points.pictured(points, averaged), "hosts": hosts.described(),
-                  "notes": list(notes(hosts, epochs)), "threads": options.threads, "epochs": epochs, "runs": options.runs,
+                  "notes": list(notes(hosts, options.threads, epochs)), "threads": options.threads, "epochs": epochs, "runs": options.runs,
                   "quick": options.quick,
                   "machine": before, "date": date(), "command": command("perf/evaluation/dsgd.py")}
     write(result, options.output)

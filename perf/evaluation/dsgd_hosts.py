@@ -44,6 +44,12 @@ class Hosts:
             self.missing.append("a core of its own for the second host: both share the only one")
         self.quota, self.period_ms = (quota, self.PERIOD_US / 1000) if self.group else (None, None)
 
+    def over(self, linked):
+        """The same two hosts with another link between them: two namespaces of `linked_hosts`."""
+        near, far = linked.keepers
+        return LinkedPair(Host(linked.addresses["near"], self.near.cores, near),
+                          Host(linked.addresses["far"], self.far.cores, far, self.group), self.others)
+
     def described(self):
         return {"namespaces": bool(self.keepers), "cores": self.near.cores, "far_cores": self.far.cores,
                 "far_quota": self.quota, "far_period_ms": self.period_ms, "near_reduced_cores": self.others,
@@ -111,6 +117,11 @@ class Hosts:
                 os.rmdir(self.group)
             except OSError:
                 pass  # a process in it has not ended yet
+
+
+class LinkedPair:
+    def __init__(self, near, far, others):
+        self.near, self.far, self.others = near, far, others
 
 
 def can_pin():

@@ -23,7 +23,7 @@ from pathlib import Path
 
 from clean_environment import clean_environment
 from interval import interval_over, quantile
-from linked_hosts import LinkedHosts, OneHost, why_not
+from linked_hosts import WIFI, LinkedHosts, OneHost, why_not
 from packet_values import ROUNDED, UNROUNDED
 from provenance import command, date, machine
 from result_file import write
@@ -38,7 +38,7 @@ LINKS = [
     ("paced", "on loopback, 50 a second", None, 20),
     ("cable", "between namespaces, by a virtual cable", [], 20),
     ("wifi", "like WiFi: 1.5 ms each way, jitter of 1 ms on average, 1 % lost",
-     ["--delay", "1.5", "--jitter", "1", "--loss", "1"], 20),
+     list(WIFI), 20),
     ("narrow", "64 kbit/s, 5 ms each way", ["--rate", "64", "--delay", "5"], 100),
 ]
 KINDS = {"icd-pull": "round trip by hand", "pull": "PULL", "icd-update": "one way by hand",

@@ -9,6 +9,9 @@ import socket
 import subprocess
 
 
+WIFI = ("--delay", "1.5", "--jitter", "1", "--loss", "1")  # a link like WiFi: ms each way, ms on average, percent
+
+
 def free_group():
     """A multicast group on loopback at a port of its own, separate from all other nodes of this host."""
     with socket.socket(type=socket.SOCK_DGRAM) as probe:

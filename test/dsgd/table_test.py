@@ -27,6 +27,7 @@ import reported  # noqa: E402
 
 ROWS = ["local_one_near", "local_one_far", "local_all_near", "local_all_far", "local_all_near_reduced", "near_asked_by_near",
         "near_asked_by_far", "near_reduced_asked_by_far", "both_asked_by_far", "both_weighted", "both_resplit"]
+BY_WIFI = ["near_asked_by_far_wifi", "both_asked_by_far_wifi"]
 
 
 LIMIT_S = 270  # less than the test may take, so that what was started is ended
@@ -39,10 +40,14 @@ def use_two_cores():
 class Table(unittest.TestCase):
     def test_every_row_is_measured(self):
         with tempfile.TemporaryDirectory() as folder:
-            # A thread for each core that there is, and shards of sizes that are fixed below.
+            # As many threads as the paper's, on two cores, and shards of sizes that are fixed below.
             result, page = evaluated.evaluated(self, "dsgd", BUILD, folder, LIMIT_S, preexec_fn=use_two_cores)
         self.assertIn("overhead: elapsed less the longest shard's own time", page)
-        self.assertEqual([row["name"] for row in result["rows"]], ROWS)
+        names = [row["name"] for row in result["rows"]]
+        self.assertIn(names, (ROWS, ROWS + BY_WIFI))
+        self.assertEqual(names == ROWS, any("WiFi" in text for text in result["hosts"]["not_allowed"]))
+        self.assertEqual(result["threads"], 4)
+        self.assertIn("Each host runs 4 threads, or as many workers", page)
         self.assertTrue(result["checks"]["same_mse_to_6_digits"])
         self.assertTrue(result["checks"]["mse_found_again"])
         self.assertTrue(result["checks"]["sizes_near_least_mse"])
@@ -63,7 +68,7 @@ class Table(unittest.TestCase):
             for points in row["points"]:
                 self.assertEqual(sum(count for _, count in points), 200_000)
                 self.assertLessEqual({node for node, _ in points}, {"near_reduced", "far"})
-        self.assertEqual([each["epochs"] for each in result["sizes"]], [1, 3, 10])
+        self.assertEqual([each["epochs"] for each in result["sizes"]], [3, 10])
         for each in result["sizes"]:
             self.assertGreater(each["shard_ms"]["median"], 0)
             self.assertGreater(each["gain_resplit"]["median"], 0)
@@ -102,6 +107,10 @@ class Table(unittest.TestCase):
         self.assertEqual(found["delegate_less_local"]["paper"], 10)
         self.assertAlmostEqual(found["delegate_less_local_share"]["paper"], 0.4587, 4)
         self.assertEqual(found["far_less_near"]["paper"], 100)
+        self.assertNotIn("far_less_near_wifi", found)
+        rows.append(row("near_asked_by_far_wifi", [paper["near_asked_by_near"] + 100.0] * 3, [4.0] * 3))
+        by_wifi = {each["name"]: each for each in dsgd_figures.figures(rows, [], hosts, 4)}["far_less_near_wifi"]
+        self.assertEqual((by_wifi["value"], by_wifi["paper"]), (100, 100))
         strict = found["overhead"]
         self.assertEqual((strict["value"], strict["paper"], strict["reached"]), (4.0, None, False))
         self.assertFalse(found["trial_shortest"]["reached"])  # one was shorter than three periods
