@@ -85,6 +85,7 @@ class Latency(unittest.TestCase):
         for kind in KINDS:
             self.assertEqual(len(self.result["series"]["loopback"][f"{kind}_p50_us"]), 3)
         self.assertEqual(self.figures["loopback_pull_ratio_p50"]["target"], "<= 1.1")
+        self.assertEqual(self.figures["loopback_pull_overhead"]["paper"], 1500)
 
     def test_paced_pulls_are_compared_and_say_what_ran(self):
         for name, _, _, interval_ms in latency.LINKS:
