@@ -129,28 +129,37 @@ class Page(unittest.TestCase):
         self.assertEqual(evaluation.files_of(evaluation.recounted(old)), evaluation.files_of(evaluation.recounted(self.record)))
         self.assertNotEqual(evaluation.page_of(old), self.page)
 
-    def test_the_command_writes_it(self):
+    @unittest.skipUnless(shutil.which("gnuplot"), "there is no gnuplot")
+    def test_its_pictures_are_drawn(self):
+        drawn = evaluation.pictures_of(RAWS)
+        self.assertEqual(set(drawn), {f"{file}.svg" for _, _, file, _ in evaluation.PICTURES})
+        for svg in drawn.values():
+            self.assertTrue(ElementTree.fromstring(svg).tag.endswith("svg"))
+
+    def test_the_command_writes_all_or_nothing(self):
         with tempfile.TemporaryDirectory(prefix="cles-evaluation-") as folder:
             raw, docs = Path(folder) / "raw", Path(folder) / "docs"
             raw.mkdir()
             docs.mkdir()
             for name, value in {**RAWS, "run": RUN}.items():
                 (raw / f"{name}.json").write_text(json.dumps(value), encoding="utf-8")
-            command = [sys.executable, "-B", str(ROOT / "scripts" / "evaluate")]
-            done = subprocess.run([*command, "--from", str(raw), "-o", folder, "--docs", str(docs)], capture_output=True,
-                                  text=True, timeout=100, check=False)
-            if not shutil.which("gnuplot"):
-                self.assertEqual(done.returncode, 1)
-                self.assertIn("no picture fig3: there is no gnuplot", done.stderr)
-                self.assertEqual(list(docs.iterdir()), [])
-                return
+
+            def evaluate(*arguments):
+                return subprocess.run([sys.executable, "-B", str(ROOT / "scripts" / "evaluate"), *map(str, arguments)],
+                                      capture_output=True, text=True, timeout=100, check=False, env={"PATH": "/nowhere"})
+
+            done = evaluate("--from", raw, "-o", folder, "--docs", docs)
+            self.assertEqual(done.returncode, 1)
+            self.assertIn("cles: no picture fig3: there is no gnuplot", done.stderr)
+            self.assertEqual(list(docs.iterdir()), [])
+            self.assertEqual(evaluate("--recount", docs).returncode, 1)
+            for name, text in evaluation.files_of(self.record).items():
+                (docs / name).write_text("" if name == evaluation.PAGE else text, encoding="utf-8")
+            done = evaluate("--recount", docs)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertEqual((docs / evaluation.PAGE).read_text(encoding="utf-8"), self.page)
-            for _, _, file, _ in evaluation.PICTURES:
-                self.assertTrue(ElementTree.parse(docs / f"{file}.svg").getroot().tag.endswith("svg"))
-            done = subprocess.run([*command, "--recount", str(docs)], capture_output=True, text=True, timeout=100, check=False)
-            self.assertEqual(done.returncode, 0, done.stderr)
-            self.assertEqual((docs / evaluation.PAGE).read_text(encoding="utf-8"), self.page)
+            for wrong in (("--docs", docs, "--quick"), ("--docs", "/nowhere"), ("--recount", docs, "--quick")):
+                self.assertEqual(evaluate(*wrong).returncode, 2, wrong)
 
 
 class Committed(unittest.TestCase):
