@@ -99,7 +99,7 @@ def measured(options):
     before = machine()  # before anything runs
     runs, without = measure(options)
     texts = links(options.kbit)
-    return {"title": "From data to decision (sections 2.2 and 4.3)", "command": command("perf/evaluation/decision_latency.py"),
+    return {"title": "From data to decision (sections 2.2 and 4.2)", "command": command("perf/evaluation/decision_latency.py"),
             "machine": before, "date": date(), "quick": options.quick, "kbit": options.kbit, "links": texts, "steps": STEPS,
             "figures": list(figures(runs, texts)), "without_strike": without, "runs": runs}
 

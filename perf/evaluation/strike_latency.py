@@ -205,7 +205,7 @@ def main():
     setups = {URGENT: Setup(options.workers, options.real_time, options.busy_poll), DEFAULT: Setup()}
     texts = {name: setup.text(cores) for name, setup in setups.items()}
     found = measure(options, setups)
-    result = {"title": "Allocation of tasks: strike orders while video frames saturate the node (section 4.3)",
+    result = {"title": "Allocation of tasks: strike orders while video frames saturate the node (section 4.2)",
               "command": command("perf/evaluation/strike_latency.py"), "machine": before, "date": date(),
               "quick": options.quick, "orders": options.orders, "streams": options.streams, "setups": texts,
               "figures": figures(found, texts), "rounds": found}

@@ -35,7 +35,7 @@ SECTIONS = (
             "Section 4.2, the second case study: DELEGATE of video processing to a node that offers it, tracks to all that are "
             "bound, and DELEGATE of a strike.", ("clesd", "cles_jadc2", "cles_plugin_fmv", "cles_plugin_strike")),
     Section("decision_latency", "From data to decision, and to the answer",
-            "Sections 2.2 and 4.3: from the sensor to the decision, and to the strike. It reports no time.",
+            "Sections 2.2 and 4.2: from the sensor to the decision, and to the strike. It reports no time.",
             ("cles_command", "clesd", "cles_jadc2", "cles_plugin_fmv", "cles_plugin_strike")),
     Section("peers", "Beside other middleware", "", ("cles_command", "clesd", "cles_peer_*"), "perf/peers"),
 )

@@ -21,7 +21,7 @@ struct settings {
 };
 BOOST_DESCRIBE_STRUCT(settings, (), (streams, idle_s, plots, seed))
 
-/// Finds what moves in full motion video (paper, sections 2.2 and 4.3).
+/// Finds what moves in full motion video (paper, sections 2.2 and 4.2).
 ///
 /// - DELEGATE FMV_Processing: receives a video from its requester, until it ends; see `video_message`, `video_frame`,
 /// `found`, which is its progress, and `video_result`. Not idempotent: a node that goes on with a video takes the next

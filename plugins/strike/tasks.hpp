@@ -34,7 +34,7 @@ BOOST_DESCRIBE_STRUCT(settings, (),
                       (weapons, lat, lon, height, speed, oldest_s, range_m, flight_s, widest_m, scans, seed, ledger,
                        must_be_signed, must_be_confirmed))
 
-/// A strike aircraft's ability (paper, sections 2.2 and 4.3).
+/// A strike aircraft's ability (paper, sections 2.2 and 4.2).
 ///
 /// - DELEGATE strike: see `order`, `outcome` and `decide`. Not idempotent: where the answer is lost it is not repeated.
 /// What is released is written to the ledger first, and no order in it is carried out again.

@@ -30,6 +30,14 @@ class Block:
         return "any-numbers" in self.note.split()
 
     @property
+    def by_value(self) -> bool:
+        return "by-value" in self.note.split()
+
+    @property
+    def times_vary(self) -> bool:
+        return "times-vary" in self.note.split()
+
+    @property
     def in_ci(self) -> bool:
         return self.note == "ci"
 

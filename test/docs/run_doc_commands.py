@@ -8,7 +8,11 @@
 - In a ```console block, what follows `$ ` is a command (a `\\` at its end goes on in the next line), and what follows the
   command is what it prints, where `...` stands for anything (alone on a line: for any lines).
 - In a ```sh block every line is a command, and has to succeed.
-- In "console any-numbers" blocks the numbers in what is printed, and the width of gaps, are examples.
+- In "console any-numbers" blocks the numbers in what is printed, and the width of gaps, are those of one run. Commands whose output
+  is the same in every run must not be there.
+- In "console by-value" blocks numbers are compared by value, and gaps by being there; with "times-vary" too, times are those of one
+  run.
+- `...` does not stand for a number alone: the page shows that of one run.
 - A command that ends in ` &` goes on in the background; the next one waits until it has printed what the page says, or
   anything; its log, on stderr, is left out. It is stopped at the end of its page.
 - Nodes find each other in a group of the page's own.
@@ -43,10 +47,11 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).resolve().parent.parent / "cli"))
 from page import Block, blocks_of  # noqa: E402
-from transcript import difference, matches, without_numbers  # noqa: E402
+from transcript import by_value, difference, matches, placeholders, without_numbers  # noqa: E402
 from two_hosts import Hosts  # noqa: E402
 
 MARK = "--end-of-command--"
+DETERMINISTIC = re.compile(r"\bcles-platoon simulate\b|\bcles-jadc2 (rehearse|compare)\b|\bcles-dsgd --local\b")
 PATIENCE = 30.0
 
 
@@ -164,6 +169,8 @@ def commands_of(block: Block) -> list[tuple[int, str, list[str]]]:
 
 
 def agree(block: Block, expected: list[str], printed: list[str]) -> bool:
+    if block.by_value:
+        return matches(by_value(expected, block.times_vary), by_value(printed, block.times_vary))
     if block.any_numbers:
         return matches(without_numbers(expected), without_numbers(printed))
     return matches(expected, printed)
@@ -219,6 +226,9 @@ def run_page(page: Path, root: Path, build: Path, path: Path) -> list[str]:
     blocks = [block for block in blocks_of(page) if block.language in ("sh", "console")]
     tested = [block for block in blocks if not block.skipped and not block.in_ci]
     problems = [problem for block in blocks if block not in tested for problem in check_left_out(page, root, block)]
+    problems += [f"{page}:{line}: 'any-numbers', but the output of '{command}' is the same in every run: 'by-value'"
+                 for block in tested if block.any_numbers
+                 for line, command, _ in commands_of(block) if DETERMINISTIC.search(command)]
     hosts = any(block.host for block in tested)
     for block in tested:
         if bool(block.host) != hosts:
@@ -269,6 +279,8 @@ def run_steps(page: Path, steps: list[Step], root: Path, build: Path, path: Path
                 problems.append(f"{where}\nended with {status}:\n" + "\n".join(printed))
             elif step.block.language == "console" and not agree(step.block, step.expected, printed):
                 problems.append(f"{where}\n{difference(step.expected, printed)}")
+            elif shown := placeholders(step.expected, printed):
+                problems.append(f"{where}\n'...' stands for a number: show that of one run\n" + "\n".join(shown))
             else:
                 print(f"ok   {where}")
     except Mistake as mistake:
@@ -302,6 +314,14 @@ $ cat
 $ echo '1  -2.5 {"a":3.25} x4'
 10 3 {"a":7} x4
 ```
+```console by-value
+$ echo '1.50  -2.5 {"a":0.10} x4 took 7 ms'
+1.5 -2.50 {"a":0.1} x4 took 7.0 ms
+```
+```console by-value times-vary
+$ echo 'error 1.50, 1.25 ms of 3 s, overhead 0.5'
+error 1.5, 4 ms of 20 s, overhead 7
+```
 ```sh
 true # why
 test -d /tmp
@@ -312,6 +332,11 @@ false
 """
 BAD = [("```console\n$ echo one\ntwo\n```\n", "+one"), ("```console any-numbers\n$ echo 1 b\n1 c\n```\n", "+1 b"),
        ("```console any-numbers\n$ echo version 1.0.0\nversion 0.1.0\n```\n", "+version 1.0.0"),
+       ("```console by-value\n$ echo ratio 1.51\nratio 1.5\n```\n", "+ratio 1.51"),
+       ("```console by-value\n$ echo 1.5 ms\n1.6 ms\n```\n", "+1.5 ms"),
+       ("```console by-value times-vary\n$ echo 1.5 m\n1.6 m\n```\n", "+1.5 m"),
+       ("```console any-numbers\n$ echo took 1.5 ms\ntook ...\n```\n", "'...' stands for a number"),
+       ("```console\n$ true cles-jadc2 compare | cat\n```\n```console any-numbers\n$ true cles-platoon simulate\n```\n", "the same in every run"),
        ("```sh\nfalse\n```\n", "ended with 1"),
        ("```sh no-test\ntrue\n```\n", "needs a reason"), ("```sh ci\nscripts/test\nscripts/other\n```\n", "not run 'scripts/other'"),
        ("```sh two-hosts\n(echo up; exec sleep 20) &\n! grep -q 192.168.1.12 /proc/net/fib_trie\n```\n", "(on host 2)"),
