@@ -47,6 +47,10 @@ def problems_of(rows: list[list[str]], tests: set[str], root: Path) -> list[str]
 
 
 def is_there(evidence: str, tests: set[str], root: Path) -> bool:
+    """Of a part that is not built here, such as federation, the source of the test has to be there."""
+    label, _, suite = evidence.partition(".")
+    if re.fullmatch(r"\w+", label) and suite and not any(name.startswith(label + ".") for name in tests):
+        return any((root / "test" / label).rglob(f"{suite.removeprefix('clesd_')}_test.*"))
     return evidence in tests or PROGRAMS.match(evidence) is not None or (root / evidence.split()[0]).is_file()
 
 
