@@ -232,14 +232,15 @@ def _latency(record):
         tail = " → ".join(number(found[f"{link}_{kind}"]["value"]) for kind in ("icd_pull_p99", "pull_p99"))
         rows.append([meaning, *map(cell, ("icd_pull_p50", "pull_p50", "pull_overhead", "pull_ratio_p50")), tail,
                      *map(cell, ("update_p50", "update_to_pull_p50", "update_multicast_p50"))])
-    overhead = max(found[f"{link}_pull_overhead"]["value"] for link in LINKS)
+    narrow = found["narrow_pull_overhead"]["value"]
+    overhead = max(found[f"{link}_pull_overhead"]["value"] for link in LINKS if link != "narrow")
     paper = found["loopback_pull_overhead"]["paper"]
     return f"""A PULL of the localization (time, latitude, longitude, velocity, acceleration), and an update of it, in µs:
 
 {table(LATENCY_HEAD, rows)}
 
-CLES adds {number(overhead)} µs to a round trip at most, in the paper {number(paper)} µs. Platooning allows 100 ms. "Of a PULL" is the
-one-way time as a part of PULL's round trip; the paper expects half.
+CLES adds {number(overhead)} µs to a round trip at most; over 64 kbit/s, where each byte takes 125 µs, {number(narrow)}. In the paper it is
+{number(paper)} µs. Platooning allows 100 ms. "Of a PULL" is the one-way time as a part of PULL's round trip; the paper expects half.
 
 {picture("evaluation_latency")}"""
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""The minimal service is suitable for small devices: its size, the libraries it links, its memory while it serves.
+"""The minimal service is suitable for small devices: its size, the libraries it links, its memory while it serves. perf/README.md
+states its size and what is allowed.
 
     minimal_service.py STRIPPED_PROGRAM
 """
@@ -18,6 +19,7 @@ MAX_SIZE = 1_076_000  # what it has reached, and one page: looking up names side
 # silent node whether it lives, following the interfaces of the host, and asking for others are in it
 MAX_PRIVATE = 1 << 20
 MAX_RESIDENT = 4 << 20
+MAX_OFF = 8_192  # bytes by which the size on the page may differ
 REQUESTS = 2_000
 # Those of the system: the C and C++ libraries, the loader, and what the kernel maps.
 ALLOWED = re.compile(r"^(libc|libm|libstdc\+\+|libgcc_s)\.so\.|^ld-linux.*\.so\.|^linux-(vdso|gate)\.so\.")
@@ -61,9 +63,22 @@ def memory_while_serving(program: str) -> dict[str, int]:
             service.kill()
 
 
+def check_page(size: int) -> None:
+    page = (Path(__file__).resolve().parents[2] / "perf" / "README.md").read_text(encoding="utf-8")
+    stated = re.search(r"^\| minimal service .*? \| ([\d,]+) bytes \|", page, re.MULTILINE)
+    allowed = re.search(r"^\| the minimal service \| .*? \| \u2264 ([\d.]+) MB", page, re.MULTILINE)
+    if not stated or not allowed:
+        expect(False, "perf/README.md states the size, and what is allowed")
+        return
+    of_page = int(stated[1].replace(",", ""))
+    expect(abs(size - of_page) <= MAX_OFF, f"perf/README.md states {of_page} bytes, at most {MAX_OFF} off")
+    expect(round(float(allowed[1]) * 1e6) == MAX_SIZE, f"perf/README.md states that {allowed[1]} MB are allowed")
+
+
 def main(program: str) -> int:
     size = Path(program).stat().st_size
     expect(size <= MAX_SIZE, f"size {size} bytes, allowed {MAX_SIZE}")
+    check_page(size)
 
     libraries = linked_libraries(program)
     foreign = [name for name in libraries if not ALLOWED.search(name)]
