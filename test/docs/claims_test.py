@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 CLAIMS = 84
+LISTING, MOST_LINES = "libcles/include/cles/paper.hpp", 150  # the paper's interface is a thin header
 UNMET = ("Windows", "QNX", "VxWorks", "Protobuf")
 PROGRAMS = re.compile(r"build/release/apps/(cles|cles-jadc2|cles-dsgd|cles-platoon)( |$)")
 
@@ -73,6 +74,8 @@ def main(root: Path, build: str) -> int:
     tests = set(re.findall(r"Test +#\d+: (\S+)", listed))
     rows = rows_of((root / "docs" / "paper.md").read_text(encoding="utf-8"))
     found = [*self_test(root), *problems_of(rows, tests, root)]
+    if (lines := len((root / LISTING).read_text(encoding="utf-8").splitlines())) > MOST_LINES:
+        found.append(f"{LISTING}: {lines} lines, {MOST_LINES} at most")
     print("\n".join([*found, f"claims of the paper: {len(rows)}, {len(found)} problems"]))
     return 1 if found else 0
 

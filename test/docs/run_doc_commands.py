@@ -51,7 +51,8 @@ from transcript import by_value, difference, matches, placeholders, without_numb
 from two_hosts import Hosts  # noqa: E402
 
 MARK = "--end-of-command--"
-DETERMINISTIC = re.compile(r"\bcles-platoon simulate\b|\bcles-jadc2 (rehearse|compare)\b|\bcles-dsgd --local\b")
+DETERMINISTIC = re.compile(r"\bcles-platoon simulate\b|\bcles-jadc2 (rehearse|compare)\b|\bcles-dsgd --local\b"
+                           r"|\bcles delegate \S+:primes\b")
 PATIENCE = 30.0
 
 

@@ -135,6 +135,10 @@ WRONG = {
         handler("[](cles::request) -> asio::awaitable<void> { co_return; }", "bind"),
         "a BIND handler must be a plain function",
     ),
+    "bind_with_responder": (
+        handler("[](const cles::request&, const cles::responder& r) { r.done(); }", "bind"),
+        "a BIND handler must be a plain function",
+    ),
     # Calls.
     "wide_integer": (
         "__extension__ typedef __int128 wide; std::string f(wide number) { return cles::to_json(number); }",
