@@ -27,6 +27,7 @@ SECTIONS = (
             "Section 4.2, Table 2: a classifier trained by threads, and by daemons to which shards are delegated. DELEGATE on one "
             "machine takes 10 ms longer than threads alone, less than 0.5 % of the whole, and 100 ms more across the network. "
             "Plugin and manager have less than 300 lines.", ("clesd", "cles_dsgd", "cles_plugin_sgd", "cles_link_relay")),
+    Section("digits_speed", "Distributed descent on handwritten digits", "", ("clesd", "cles_dsgd", "cles_plugin_digits")),
     Section("platoon", "Platooning", "Section 4.2, the first case study: each vehicle BINDs to the localization of its leader "
             "and of the one ahead.", ("cles_command", "clesd", "cles_platoon")),
     Section("platoon_cells", "Platooning: collisions at each rate with each loss, by the control law alone", "", ("cles_platoon",)),

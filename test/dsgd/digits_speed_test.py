@@ -18,15 +18,16 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 FOLDER, BUILD = sys.argv[1], sys.argv[2]
-sys.path.insert(0, FOLDER)
+sys.path[:0] = [FOLDER, str(Path(__file__).parents[1] / "perf")]
 import digits_speed  # noqa: E402
+import reported  # noqa: E402
 
 
 class Speed(unittest.TestCase):
     def test_each_side_is_measured(self):
         with tempfile.TemporaryDirectory() as folder:
             words = [sys.executable, "-B", f"{FOLDER}/digits_speed.py", "--quick", "--drawn", "--programs", f"{BUILD}/apps", "-o",
-                     f"{folder}/result.json"]
+                     f"{folder}/result.json"]  # as `scripts/evaluate --quick` calls it, where there are no other digits
             if shutil.which("gnuplot"):
                 words += ["--picture", f"{folder}/picture.svg"]
             done = subprocess.run(words, capture_output=True, text=True, timeout=270, check=False)
@@ -35,6 +36,7 @@ class Speed(unittest.TestCase):
             if shutil.which("gnuplot"):
                 self.assertTrue(ElementTree.parse(f"{folder}/picture.svg").getroot().tag.endswith("svg"))
         figures = {each["name"]: each for each in result["figures"]}
+        reported.check(self, "digits_speed", result)
         self.assertEqual(figures["speed_up_nodes"]["runs"], 2)
         self.assertIn(figures["speed_up_nodes"]["reached"], (True, False))
         # One node computes what one thread does.

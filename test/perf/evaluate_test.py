@@ -21,7 +21,8 @@ sys.path[:0] = [str(ROOT / "perf")]
 from report import figures, sections  # noqa: E402
 
 # Section: its test.
-TESTED_ELSEWHERE = {"decision_latency": "jadc2/decision_test.py", "dsgd": "dsgd/table_test.py",
+TESTED_ELSEWHERE = {"decision_latency": "jadc2/decision_test.py", "digits_speed": "dsgd/digits_speed_test.py",
+                    "dsgd": "dsgd/table_test.py",
                     "latency": "effort/latency_test.py", "platoon": "platoon/evaluation_test.py",
                     "secured_cases": "jadc2/secured_cost_test.py", "strike_latency": "jadc2/latency_test.py"}
 LIMIT_S = 1680  # less than the timeout of this test, so that what it started is ended

@@ -20,6 +20,7 @@ from xml.etree import ElementTree
 ROOT = Path(sys.argv[1])
 sys.path[:0] = [str(ROOT / "perf"), str(ROOT / "perf" / "evaluation")]
 import decision_latency  # noqa: E402
+import digits_speed  # noqa: E402
 import dsgd_figures  # noqa: E402
 import latency  # noqa: E402
 from report import evaluation  # noqa: E402
@@ -64,6 +65,18 @@ def measured_descent():
     found = {**sample("dsgd"), "quick": False, "threads": 4, "machine": MACHINE}
     others = [each for each in found["figures"] if not each["name"].startswith("lines")]
     return {**found, "figures": [*others, *dsgd_figures.lines()], "hosts": {**found["hosts"], "not_allowed": ["a quota"]}}
+
+
+def measured_digits():
+    courses = {side: [{"accuracies": [{"round": k, "accuracy": 0.5 + 0.1 * k, "after_ms": 10.0 * k} for k in range(1, 6)],
+                       "accuracy": 1.0, "bytes_per_round": 51_953} for _ in range(4)] for side in digits_speed.SIDES}
+    courses["non_iid"] = [{**each, "accuracies": each["accuracies"][:2]} for each in courses["non_iid"]]
+    speeds = {side: [1000.0 * place] * 4 for place, side in enumerate(digits_speed.SIDES, 1)}
+    curves = digits_speed.curves_of(courses)
+    return {"title": "Digits", "command": "c", "machine": MACHINE, "date": "2026-01-02", "quick": False, "drawn": False, "seeds": 4,
+            "rounds": 60, "hidden": 64, "rates": dict.fromkeys(digits_speed.SIDES, 0.05), "curves": curves,
+            "figures": list(digits_speed.figures_of(speeds, courses, 60)),
+            "series": {"accuracy": {"lines": digits_speed.lines_of(curves)}}}
 
 
 RAWS = {"latency": measured_latency(), "bench": {**sample("bench"), "quick": False, "machine": MACHINE},
@@ -122,6 +135,16 @@ class Page(unittest.TestCase):
         with self.assertRaisesRegex(evaluation.Unfit, "decision_latency has not been measured"):
             evaluation.record_of(without, RUN)
 
+    def test_digits_are_there_if_they_were_measured(self):
+        self.assertNotIn("handwritten", self.page)
+        raws = {**RAWS, evaluation.DIGITS: measured_digits()}
+        page = evaluation.page_of(evaluation.record_of(raws, RUN))
+        self.assertIn("| two nodes, a core each | 0.05 | 3,000 | 4 of 4 | 50 | 100 | 51,953 |", page)
+        self.assertIn("| two nodes, each with few classes | 0.05 | 4,000 | 0 of 4 | – | 100 | 51,953 |", page)
+        self.assertIn("Two nodes process 1.50 times as many images", page)
+        with self.assertRaisesRegex(evaluation.Unfit, "digits_speed: a quick run"):
+            evaluation.record_of({**raws, evaluation.DIGITS: {**measured_digits(), "drawn": True}}, RUN)
+
     def test_lines_are_counted_again(self):
         old = copy.deepcopy(self.record)
         old["figures"]["latency"]["cles_lines"]["value"] = 1
@@ -171,7 +194,7 @@ class Committed(unittest.TestCase):
         found = json.loads(record.read_text(encoding="utf-8"))
         for name, text in evaluation.files_of(found).items():
             self.assertEqual((ROOT / "docs" / name).read_text(encoding="utf-8"), text, name)
-        for _, _, file, _ in evaluation.PICTURES:
+        for _, _, file, _ in evaluation.shown_pictures(found["sections"]):
             self.assertTrue((ROOT / "docs" / f"{file}.svg").exists(), file)
         self.assertEqual(evaluation.recounted(found), found, "lines have changed: scripts/evaluate --recount docs")
 
