@@ -20,7 +20,7 @@ PICTURES = (
     ("dsgd", "dsgd", "evaluation_table2", "Table 2 as speed-ups over one thread of the first host"),
     ("dsgd", "data_set", "evaluation_fig5", "The data set with its classifier (Fig. 5)"),
     ("dsgd", "data_set_zoomed", "evaluation_fig6", "The same where the classes meet (Fig. 6)"),
-    ("decision_latency", "jadc2_decision", "evaluation_decision", "Each step from data to decision, and to the answer"),
+    ("decision_latency", "jadc2_decision", "jadc2_decision", "Each step from data to decision, and to the answer"),
 )
 DIGITS_PICTURE = (DIGITS, "digits_speed_accuracy", "evaluation_digits", "Accuracy on digits that no node has, over time")
 PAPER_THREADS = 4
@@ -358,4 +358,4 @@ reports no times.
 
 {table(["", *decision["links"].values()], rows)}
 
-{picture("evaluation_decision")}"""
+{picture("jadc2_decision")}"""
