@@ -56,9 +56,9 @@ class Missing(unittest.TestCase):
         self.assertEqual(len(mission.all("trouble")), 1)  # reported once
         self.assertEqual(mission.all("report")[0]["data"]["given"], 0)
 
-    def check_refused(self, strikers, words):
+    def check_refused(self, strikers, words, *arguments):
         recon = self.fleet.recon([self.fleet.satellite()], "--fps", "30")
-        mission = self.fleet.mission(recon, strikers, "--duration", "60")
+        mission = self.fleet.mission(recon, strikers, "--duration", "60", *arguments)
         self.assertEqual(mission.end(), 3, mission.events)
         told = mission.all("strike")[0]["data"]
         self.assertEqual(told["fate"], "refused")
@@ -76,6 +76,11 @@ class Missing(unittest.TestCase):
     def test_no_weapon_anywhere(self):
         plugin = f"{{path: {self.fleet.plugin('strike')}, config: {{weapons: 0}}}}"
         self.check_refused([self.fleet.striker(plugins=[plugin])], "no weapon is left")
+
+    def test_an_audit_file_that_cannot_be_written(self):
+        striker = self.fleet.striker()
+        self.check_refused([striker], "the audit file cannot be written", "--audit", "/dev/full")
+        self.assertEqual(striker.pull("strike1:strike"), {"left": 4, "orders": []})
 
     def test_orders_that_must_be_signed_where_nobody_has_a_key(self):
         plugin = f"{{path: {self.fleet.plugin('strike')}, config: {{must_be_signed: true}}}}"
