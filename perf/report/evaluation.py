@@ -203,7 +203,7 @@ def _introduction(record):
 nothing else, measures all of it, and writes this page, its pictures, and `{RECORD}`, from which a test makes the page
 again:
 
-```sh no-test: it takes more than an hour, and requires root
+```sh no-test: it takes long, and requires root
 scripts/evaluate --docs docs
 ```
 
