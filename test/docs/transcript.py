@@ -6,7 +6,7 @@ import re
 from decimal import Decimal
 
 # What the clock decides, in output that is deterministic otherwise.
-TIME = re.compile(r"(?P<before>\b(?:longest shard|overhead) +)?(?P<value>(?<![\w.])-?\d+(?:\.\d+)?)(?P<unit> ?(?:ns|us|\u00b5s|ms|s)\b)?")
+TIME = re.compile(r"(?P<before>\b(?:longest shard|overhead) +)?(?P<value>(?<![\w.])-?\d+(?:\.\d+)?)(?P<unit> ?(?:ns|us|\u00b5s|ms|s)\b| images per second)?")
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?![\w.]*\w)")
 ONLY_A_NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?: ?(?:ns|us|\u00b5s|ms|s|%))?")
 
