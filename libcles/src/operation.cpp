@@ -74,12 +74,14 @@ feed_owner::feed_owner(std::shared_ptr<feed_control> control, bool elsewhere)
 
 feed_owner::feed_owner(feed_owner&& other) noexcept
     // NOLINTNEXTLINE(performance-move-constructor-init)
-    : control_(std::move(other.control_)), executor_(other.executor_), elsewhere_(other.elsewhere_) {}
+    : control_(std::move(other.control_)), batch_memory_(std::move(other.batch_memory_)), executor_(other.executor_),
+      elsewhere_(other.elsewhere_) {}
 
 feed_owner& feed_owner::operator=(feed_owner&& other) noexcept {
     if (this != &other) {
         close();
         control_ = std::move(other.control_);
+        batch_memory_ = std::move(other.batch_memory_);
         executor_ = other.executor_;
         elsewhere_ = other.elsewhere_;
     }

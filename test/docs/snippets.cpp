@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // The code blocks of the pages, in one file that is compiled. test/docs/code_in_docs.py looks for each of them here and
 // in the examples.
+#include <cles/feed_batch.hpp>
 #include <cles/job_feed.hpp>
 #include <cles/security.hpp>
 #include <cles/service.hpp>
@@ -10,6 +11,7 @@
 #include <boost/asio/io_context.hpp>
 
 #include <iostream>
+#include <span>
 
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
@@ -80,10 +82,13 @@ asio::awaitable<void> finding(asio::io_context& io);
 asio::awaitable<void> errors(cles::service& car);
 asio::awaitable<void> feeds(cles::service& car, position here);
 asio::awaitable<void> feeds_of_all(cles::service& car);
+asio::awaitable<void> batches(cles::service& car);
+void follow_all(cles::feed<position>& positions);
 void blocking(cles::service& me);
 asio::awaitable<double> drive_to(position where);
 double pressure_of(const cles::request& asked);
 void follow(const position& where);
+void record(const position& where);
 void slow_down(const std::string& why);
 
 void a_service() {
@@ -176,6 +181,28 @@ asio::awaitable<void> feeds(cles::service& car, position here) {
             slow_down(event.text);
         }
     }
+}
+
+asio::awaitable<void> batches(cles::service& car) {
+    auto positions = co_await car.async_bind<position>("car0:position", cles::bind_options{}.keep(1024));
+    for (;;) {
+        for (const auto& event : co_await positions.async_next_batch()) { // <cles/feed_batch.hpp>
+            if (event.has_value()) {
+                record(event.value);
+            }
+        }
+    }
+}
+
+void follow_all(cles::feed<position>& positions) {
+    positions.async_next_batch([&](boost::system::error_code code, std::span<const cles::feed_item<position>> events) {
+        for (const auto& event : events) {
+            record(event.value);
+        }
+        if (!code) {
+            follow_all(positions);
+        }
+    });
 }
 
 asio::awaitable<void> feeds_of_all(cles::service& car) {

@@ -382,7 +382,7 @@ BOOST_AUTO_TEST_CASE(one_function_delivers_several_events_that_wait) {
         ++functions;
     }
     BOOST_TEST(got == 48);
-    BOOST_TEST(functions < 16); // 3 are needed, and others may be due
+    BOOST_TEST(functions < 16); // one is needed, and others may be due
 }
 
 BOOST_DATA_TEST_CASE(a_handler_may_wait_again_and_then_end_its_feed,

@@ -15,7 +15,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-HEADER = """#include <cles/service.hpp>
+HEADER = """#include <cles/feed_batch.hpp>
+#include <cles/service.hpp>
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/bind_executor.hpp>
 #include <boost/asio/deferred.hpp>
@@ -207,6 +208,10 @@ WRONG = {
     ),
     "callback_of_feed": (
         'void f(cles::feed<double>& feed) { feed.async_next([](boost::system::error_code) {}); }',
+        CALLBACK,
+    ),
+    "callback_of_batches": (
+        'void f(cles::feed<double>& feed) { feed.async_next_batch([](boost::system::error_code) {}); }',
         CALLBACK,
     ),
     "deadline_as_token": (

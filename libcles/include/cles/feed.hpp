@@ -107,7 +107,7 @@ bool read_shared_body(const raw_event& event, T& value, boost::system::error_cod
     return detail::read_body(event, value, code, why);
 }
 
-/// Fills the item from an event. False if its body is not JSON.
+/// Fills a new item from an event. False if its body is not JSON.
 template <class T>
 bool fill(const raw_event& event, feed_item<T>& item, boost::system::error_code& code, std::string& why) {
     item.kind = event.kind;
@@ -115,7 +115,9 @@ bool fill(const raw_event& event, feed_item<T>& item, boost::system::error_code&
     item.seq = event.seq;
     item.epoch = event.epoch;
     item.missed = event.missed;
-    item.text = event.text;
+    if (!event.text.empty()) { // usually it is, and assigning takes longer
+        item.text = event.text;
+    }
     return !item.has_value() || detail::read_shared_body(event, item.value, code, why);
 }
 
@@ -226,9 +228,12 @@ class feed_owner {
     [[nodiscard]] bool is_open() const noexcept { return control_ != nullptr; }
     [[nodiscard]] next_source source() const;
     void close();
+    /// What the feed keeps for its batches, whose type depends on that of the values.
+    [[nodiscard]] std::shared_ptr<void>& batch_memory() noexcept { return batch_memory_; }
 
   private:
     std::shared_ptr<feed_control> control_;
+    std::shared_ptr<void> batch_memory_;
     boost::asio::any_io_executor executor_; // kept when the feed is closed
     bool elsewhere_ = false;                // it was passed to a handler on another executor
 };
@@ -284,6 +289,10 @@ class bind_operation final : public binding {
     std::string* diagnostics_;
 };
 
+/// How batches are fetched; defined in `<cles/feed_batch.hpp>`, of which the compiler's message reminds.
+template <class T>
+struct needs_feed_batch_hpp;
+
 } // namespace detail
 
 /// A binding from the subscriber's side: it receives the updates of one noun, and changes of the binding's state.
@@ -328,6 +337,15 @@ class feed {
                 },
                 token);
         }
+    }
+
+    /// As `async_next`, but waits for all events that are there: what one read of a link brings, or what has waited in
+    /// the feed. Completes with a `feed_batch<T>`, which is never empty. Where an update does not convert to T, the
+    /// batch ends; the next call fails with `conversion`, and the one after it continues. While this waits, events come
+    /// in any number, and none is dropped. Include `<cles/feed_batch.hpp>` to call it.
+    template <class Token = boost::asio::use_awaitable_t<>>
+    auto async_next_batch(Token&& token = {}) {
+        return detail::needs_feed_batch_hpp<T>::next(owner_, std::forward<Token>(token));
     }
 
     /// Unbinds. A pending `async_next` fails with `cancelled`, soon, but never inside this call.

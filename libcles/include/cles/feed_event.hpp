@@ -48,6 +48,8 @@ struct raw_event {
     }
 };
 
+class pending_batch;
+
 /// A pending `async_next`.
 class pending_event {
   public:
@@ -61,9 +63,38 @@ class pending_event {
     virtual void discard() noexcept = 0;
     /// As `pending::calls_user`.
     [[nodiscard]] virtual bool calls_user() const noexcept { return true; }
+    /// This, if it takes several events.
+    [[nodiscard]] virtual pending_batch* as_batch() noexcept { return nullptr; }
 
   protected:
     ~pending_event() = default;
+};
+
+/// A pending `async_next_batch`: takes events until its owner completes it.
+class pending_batch : public pending_event {
+  public:
+    enum class verdict : std::uint8_t {
+        kept,
+        malformed, ///< not kept: its body is not JSON
+        full,      ///< not kept: those that it has must be delivered first
+    };
+    /// Reads an event and keeps it, or the reason why it cannot be read. Calls conversions, but no handler; what they
+    /// throw changes nothing.
+    [[nodiscard]] virtual verdict keep(const raw_event& event) = 0;
+    /// Completes the operation. \pre it has kept something
+    virtual void complete() = 0;
+
+    bool deliver(const raw_event& event) final {
+        const bool is_kept = keep(event) == verdict::kept;
+        if (is_kept) {
+            complete();
+        }
+        return is_kept;
+    }
+    [[nodiscard]] pending_batch* as_batch() noexcept final { return this; }
+
+  protected:
+    ~pending_batch() = default;
 };
 
 } // namespace detail

@@ -81,6 +81,10 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
     [[nodiscard]] engine& host() const noexcept { return *host_; }
     virtual void unbind() = 0;
     [[nodiscard]] virtual bool is_starting() const = 0;
+    /// \param mail of the derived class
+    void attach(core::feed_mailbox& mail) {
+        mail.set_pump([this, &mail] { pump_soon(mail); });
+    }
     /// One call of `async_next`: completes with the next event or an error, never inside this call.
     void fetch(core::feed_mailbox& from, event_ptr operation) {
         if (from.closed()) {
@@ -93,12 +97,12 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
     }
 
   private:
-    // A handler that waits again gets the next event in the same function, up to a number. When it waits, `fetch` posts
-    // the function for what remains: it may throw then, or run the executor until the next event comes.
+    // A handler that waits again gets the next event in the same function, until it has all that waited when this
+    // began: otherwise what one read brings could outpace it. When it waits, `fetch` posts the function for what
+    // remains: it may throw then, or run the executor until the next event comes.
     void pump(core::feed_mailbox& mail) {
-        constexpr int most = 16;
         is_pump_posted_ = false;
-        for (int left = most; left != 0 && mail.pump(); --left) {
+        for (auto left = mail.waiting() + 1; left != 0 && mail.pump(); --left) {
         }
     }
     void pump_soon(core::feed_mailbox& mail) {
@@ -117,7 +121,9 @@ class link_feed final : public feed_handle {
     link_feed(const std::shared_ptr<engine>& by, const limits& bounds, std::string target, std::string path,
               bool thinned)
         : feed_handle(by), machine_(by->feeds(), by->deadlines(), by->completions(), bounds, std::move(target),
-                                    std::move(path), thinned, seed()) {}
+                                    std::move(path), thinned, seed()) {
+        attach(machine_.mail());
+    }
 
     [[nodiscard]] core::feed_machine& machine() noexcept { return machine_; }
     void start(pending_ptr bound) override {
@@ -138,7 +144,9 @@ class link_feed final : public feed_handle {
 class group_feed_handle final : public feed_handle {
   public:
     group_feed_handle(const std::shared_ptr<engine>& by, const limits& bounds, std::string target, std::string path)
-        : feed_handle(by), feed_(bounds, by->completions(), std::move(target), std::move(path)) {}
+        : feed_handle(by), feed_(bounds, by->completions(), std::move(target), std::move(path)) {
+        attach(feed_.mail());
+    }
     ~group_feed_handle() override { leave(); }
 
     /// Completes as soon as the BIND has been sent: it is not answered.
