@@ -8,12 +8,15 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace publisher {
@@ -61,8 +64,22 @@ struct fixture {
     std::vector<int> got;
 };
 
+/// A value that counts how often it is written.
+struct counted {
+    int* writes = nullptr;
+};
+
 } // namespace
 } // namespace publisher
+
+template <>
+struct cles::converter<publisher::counted> {
+    static constexpr bool is_scalar = true;
+    static void write(json_writer& w, const publisher::counted& value) {
+        w.value(static_cast<std::int64_t>(++*value.writes));
+    }
+    static bool read(json_reader& r, publisher::counted&) { return r.skip(); }
+};
 
 BOOST_FIXTURE_TEST_SUITE(publisher, fixture)
 
@@ -138,6 +155,29 @@ BOOST_AUTO_TEST_CASE(many_threads_may_publish_at_once) {
     for (auto& thread : threads) {
         thread.join();
     }
+}
+
+BOOST_AUTO_TEST_CASE(a_value_is_written_once_whatever_the_number_of_subscribers) {
+    cles::service car{io, {.name = "car", .listen = {"tcp://127.0.0.1:0"}}};
+    car.on_bind("count");
+    std::vector<std::unique_ptr<cles::service>> towers;
+    std::vector<int_feed> feeds;
+    constexpr std::size_t subscribers = 8;
+    std::size_t arrived = 0;
+    for (std::size_t i = 0; i < subscribers; ++i) {
+        towers.push_back(
+            std::make_unique<cles::service>(io, cles::service_options{.name = "tower" + std::to_string(i),
+                                                                      .peers = {{"car", car.endpoints().front()}}}));
+        towers.back()->async_bind<int>("car:count", [&](boost::system::error_code, int_feed made) {
+            made.async_next([&](boost::system::error_code, const auto& event) { arrived += event.value == 1 ? 1 : 0; });
+            feeds.push_back(std::move(made));
+        });
+    }
+    run_until(io, [&] { return feeds.size() == subscribers; });
+    int writes = 0;
+    car.update("count", counted{&writes});
+    run_until(io, [&] { return arrived == subscribers; });
+    BOOST_TEST(writes == 1);
 }
 
 BOOST_AUTO_TEST_SUITE_END()
