@@ -168,8 +168,10 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
     command.add_option("--rounds", given.rounds, "Passes of each exchange; figures are medians over them (5)")
         ->check(CLI::Range(std::size_t{1}, std::size_t{1000}).description(""))
         ->type_name("N");
-    command.add_option("--style", given.style, "How results reach the caller's code: coroutine or callback")
-        ->check(CLI::IsMember({"callback", "coroutine"}).description(""))
+    command
+        .add_option("--style", given.style,
+                    "How results reach the caller's code: coroutine, callback, or with --updates and --fan-out batch")
+        ->check(CLI::IsMember({"batch", "callback", "coroutine"}).description(""))
         ->type_name("NAME");
     command
         .add_option_function<std::string>(
@@ -206,6 +208,9 @@ measurement selected_measurement(const CLI::App& command, const bench_arguments&
     const auto what = selected_mode(command, transport);
     if (transport == carrier::multicast && given.keep != 0) {
         refuse("--keep", "has no effect with multicast");
+    }
+    if (given.style == "batch" && what != measurement::updates && what != measurement::fan_out) {
+        refuse("--style", "batch needs --updates or --fan-out");
     }
     if (what == measurement::updates && given.binders.size() > 1) {
         refuse("--updates", "accepts only one value of --binders");

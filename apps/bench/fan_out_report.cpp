@@ -82,7 +82,7 @@ std::string table_of(const fan_out_report& report) {
            " updates/s and as fast as possible; medians of " + std::to_string(report.rounds) + " rounds over " +
            report.transport + ", subscribers in one process, each with its own socket" +
            (report.transport == "multicast" ? " in the hand-written exchange, in CLES with one for all, " : ", ") +
-           report.style + "s" + waiting(report.busy_poll_us, report.wake_within_us) + ", CPU per delivery; " +
+           styles(report.style) + waiting(report.busy_poll_us, report.wake_within_us) + ", CPU per delivery; " +
            cores(report.client_core, report.server_core) + "\n";
 }
 

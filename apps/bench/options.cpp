@@ -7,10 +7,18 @@
 
 namespace tool {
 
+namespace {
+
+cles::perf::handler_style style_of(const std::string& name) {
+    using style = cles::perf::handler_style;
+    return name == "callback" ? style::callback : name == "batch" ? style::batch : style::coroutine;
+}
+
+} // namespace
+
 bench_options to_options(const bench_arguments& given, measurement what) {
     bench_options options{.transport = carrier_of(given.transport),
-                          .style = given.style == "callback" ? cles::perf::handler_style::callback
-                                                             : cles::perf::handler_style::coroutine,
+                          .style = style_of(given.style),
                           .rounds = given.rounds,
                           .requests = given.requests,
                           .against = given.against,
@@ -61,7 +69,12 @@ const char* to_string(carrier c) {
 }
 
 const char* to_string(cles::perf::handler_style s) {
-    return s == cles::perf::handler_style::coroutine ? "coroutine" : "callback";
+    switch (s) {
+    case cles::perf::handler_style::coroutine: return "coroutine";
+    case cles::perf::handler_style::callback: return "callback";
+    case cles::perf::handler_style::batch: return "batch";
+    }
+    return "";
 }
 
 std::string bench_url(carrier c) {

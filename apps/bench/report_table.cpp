@@ -28,6 +28,8 @@ std::string cores(int client, std::optional<int> server) {
     return "client on core " + std::to_string(client) + ", server on core " + std::to_string(*server);
 }
 
+std::string styles(const std::string& style) { return style + (style == "batch" ? "es" : "s"); }
+
 std::string waiting(std::int64_t busy_poll_us, std::optional<std::int64_t> wake_within_us) {
     std::string words;
     if (busy_poll_us != 0) {

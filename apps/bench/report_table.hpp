@@ -42,6 +42,8 @@ class rows {
 };
 
 std::string cores(int client, std::optional<int> server);
+/// The plural of a style's name.
+std::string styles(const std::string& style);
 /// How the ends wait for work.
 std::string waiting(std::int64_t busy_poll_us, std::optional<std::int64_t> wake_within_us);
 

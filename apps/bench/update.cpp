@@ -91,7 +91,7 @@ std::string table_of(const update_report& report) {
     out.add(cells_of("typed (struct)", report.typed));
     return out.text() + "medians of " + std::to_string(report.rounds) + " rounds of " + std::to_string(report.updates) +
            " updates over " + report.transport + " to " + std::to_string(report.binders) + " subscriber" +
-           (report.binders == 1 ? "" : "s") + ", " + report.style + "s" +
+           (report.binders == 1 ? "" : "s") + ", " + styles(report.style) +
            waiting(report.busy_poll_us, report.wake_within_us) + ", " + fixed(report.update_bytes, 1) +
            " bytes per update, CPU per delivery; " + cores(report.client_core, report.server_core) + "\n";
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/feed_batch.hpp>
 #include <cles/run.hpp>
 #include <cles/service.hpp>
 
@@ -48,6 +49,10 @@ class feed_reader {
     boost::asio::awaitable<void> read(cles::service& client) {
         feed_ = co_await client.async_bind<T>("car1:localization", options_);
         all_.bound();
+        if (style_ == handler_style::batch) {
+            next_batch();
+            co_return;
+        }
         if (style_ == handler_style::callback) {
             next();
             co_return;
@@ -68,6 +73,25 @@ class feed_reader {
                 if (take(item)) {
                     next();
                 }
+            } catch (...) {
+                all_.fail(std::current_exception());
+            }
+        });
+    }
+
+    void next_batch() {
+        feed_.async_next_batch([this](boost::system::error_code code, const feed_batch<T>& items) {
+            if (code) {
+                all_.fail(std::make_exception_ptr(cles::error(code, "a feed failed")));
+                return;
+            }
+            try {
+                for (const auto& item : items) {
+                    if (!take(item)) {
+                        return;
+                    }
+                }
+                next_batch();
             } catch (...) {
                 all_.fail(std::current_exception());
             }

@@ -88,6 +88,10 @@ class Updates(unittest.TestCase):
             self.assertEqual(figures["missed"], 0)
             self.assertGreater(figures["deliveries_per_s"], 0)
 
+    def test_all_are_delivered_in_batches(self):
+        report = measure("--updates", "--binders", "2", "--style", "batch")
+        self.assertEqual((report["style"], report["raw"]["missed"], report["typed"]["missed"]), ("batch", 0, 0))
+
 
 class FanOut(unittest.TestCase):
     def expect(self, report, transport, binders):
@@ -230,6 +234,8 @@ class Usage(unittest.TestCase):
             (("--in-flight", "0"), "--in-flight"),
             (("--busy-poll", "-1"), "--busy-poll"),
             (("--requests", "5", "--duration", "1s"), "--duration"),
+            (("--style", "batch"), "--style batch needs --updates or --fan-out"),
+            (("--urgent", "--style", "batch"), "--style batch needs --updates or --fan-out"),
             (("--binders", "2"), "--binders needs --updates or --fan-out"),
             (("--updates", "--binders", "1,2"), "only one value of --binders"),
             (("--fan-out", "--updates"), "--updates cannot be combined with --fan-out"),

@@ -39,9 +39,9 @@ void append_options(std::vector<candidate>& out, CLI::App& command) {
 
 // CLI11 does not list the values of an option, but says of each word whether it is valid.
 std::vector<candidate> keywords_of(CLI::Option& option) {
-    constexpr std::array keywords{"table",    "json", "raw",  "tcp",      "udp",  "unix",      "inproc",
-                                  "bash",     "zsh",  "fish", "name",     "load", "multicast", "coroutine",
-                                  "callback", "pull", "push", "delegate", "bind", "update"};
+    constexpr std::array keywords{"table",    "json",  "raw",  "tcp",  "udp",      "unix",      "inproc",
+                                  "bash",     "zsh",   "fish", "name", "load",     "multicast", "coroutine",
+                                  "callback", "batch", "pull", "push", "delegate", "bind",      "update"};
     std::vector<candidate> out;
     try {
         const auto& accepts = *option.get_validator();
