@@ -319,12 +319,8 @@ struct converter<T> {
         }
     }
     static bool read(json_reader& r, T& value) {
-        if (r.peek() == json_reader::kind::null) { // how numbers that are not finite are written
-            value = std::numeric_limits<T>::quiet_NaN();
-            return r.read_null();
-        }
         std::conditional_t<(sizeof(T) < sizeof(double)), float, double> number = 0;
-        if (!r.read(number)) {
+        if (!r.read_or_nan(number)) {
             return false;
         }
         value = static_cast<T>(number);

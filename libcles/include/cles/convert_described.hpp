@@ -259,10 +259,15 @@ template <class T>
 inline constexpr bool is_optional<std::optional<T>> = true;
 
 struct field {
-    std::string_view name;
+    prepared_key key;
     bool (*read)(json_reader& r, void* object);
     bool required;
+
+    [[nodiscard]] constexpr std::string_view name() const noexcept { return key.name(); }
 };
+
+template <class T, class D>
+inline constexpr prepared_key_text<detail::json_name<T, D>().size()> key_of{detail::json_name<T, D>()};
 
 bool read_fields(json_reader& r, void* object, std::span<const field> fields);
 
@@ -335,7 +340,7 @@ constexpr field field_for() {
     using member = std::remove_reference_t<decltype(std::declval<T&>().*D::pointer)>;
     using value = std::remove_cv_t<member>;
     using wrong = std::conditional_t<std::is_const_v<member>, member, typename unreadable<value>::type>;
-    return {detail::json_name<T, D>(),
+    return {key_of<T, D>,
             [](json_reader& r, void* object) {
                 if constexpr (!std::is_void_v<wrong>) {
                     member_cannot_be_read_from_JSON<D::pointer, wrong>();
@@ -362,7 +367,7 @@ inline constexpr auto field_table = table_of<T>(fields_of<T>{});
 
 constexpr bool is_among(std::span<const field> fields, std::string_view name) noexcept {
     for (const auto& f : fields) {
-        if (f.name == name) {
+        if (f.name() == name) {
             return true;
         }
     }
@@ -370,9 +375,6 @@ constexpr bool is_among(std::span<const field> fields, std::string_view name) no
 }
 
 // --- How they are written ---
-
-template <class T, class D>
-inline constexpr prepared_key_text<detail::json_name<T, D>().size()> key_of{detail::json_name<T, D>()};
 
 template <class D, class T>
 void write_field(json_writer& w, const T& object) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/prepared_key.hpp>
 #include <cles/standard.hpp>
 
 #include <cstddef>
@@ -32,6 +33,8 @@ class json_reader {
     /// True if the next member is `name`, written without escapes and white space; then works as `next_key`. Otherwise
     /// consumes nothing. Faster than `next_key` if the order of members is known.
     bool next_key_is(std::string_view name) noexcept;
+    /// The same for a key that was prepared at compile time: one comparison.
+    bool next_key_is(const prepared_key& name) noexcept;
     bool begin_array();
     /// Moves to the array's next element. False at the end of the array, which it consumes, and on failure (see `ok`).
     bool next_element();
@@ -40,6 +43,9 @@ class json_reader {
     bool read(bool& out);
     bool read(double& out);
     bool read(float& out);
+    /// The same, but null is NaN: numbers that are not finite are written so.
+    bool read_or_nan(double& out);
+    bool read_or_nan(float& out);
     bool read(std::int64_t& out);
     bool read(std::uint64_t& out);
     bool read(std::string& out);

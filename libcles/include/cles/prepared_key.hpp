@@ -36,6 +36,7 @@ class prepared_key {
     template <std::size_t Length>
     constexpr explicit(false) prepared_key(const prepared_key_text<Length>& made) noexcept : text_(made.view()) {}
     [[nodiscard]] constexpr std::string_view text() const noexcept { return text_; }
+    [[nodiscard]] constexpr std::string_view name() const noexcept { return text_.substr(2, text_.size() - 4); }
 
   private:
     std::string_view text_;

@@ -166,32 +166,55 @@ bool fail_count(json_reader& r, std::string_view which, std::size_t wanted) {
     return r.fail(std::string{which} + " than " + std::to_string(wanted) + " elements");
 }
 
+namespace {
+
+bool read_field(json_reader& r, void* object, const field& which) {
+    if (which.read(r, object)) {
+        return true;
+    }
+    r.inside_member(which.name());
+    return false;
+}
+
+// Those that follow in the order of the description. Returns the first one that does not, or that cannot be read.
+std::size_t read_in_order(json_reader& r, void* object, std::span<const field> fields, std::size_t next) {
+    while (next < fields.size() && r.next_key_is(fields[next].key) && read_field(r, object, fields[next])) {
+        ++next;
+    }
+    return next;
+}
+
+} // namespace
+
+// Usually all members arrive in order, and no others.
 bool read_fields(json_reader& r, void* object, std::span<const field> fields) {
-    boost::container::small_vector<bool, 64> seen(fields.size()); // more than most structs have
-    std::size_t next = 0;                                         // members usually arrive in order
-    std::string_view key;
     if (!r.begin_object()) {
         return false;
     }
-    for (;;) {
-        if (next < fields.size() && r.next_key_is(fields[next].name)) {
-            // as expected
-        } else if (!r.next_key(key)) {
-            break;
-        } else {
-            next = static_cast<std::size_t>(std::ranges::find(fields, key, &field::name) - fields.begin());
-        }
-        if (next == fields.size()) {
+    auto next = read_in_order(r, object, fields, 0);
+    std::string_view key;
+    bool has_more = r.next_key(key);
+    if (!has_more && next == fields.size()) {
+        return r.ok();
+    }
+    boost::container::small_vector<bool, 64> seen(fields.size()); // more than most structs have
+    std::fill_n(seen.data(), next, true);
+    while (has_more) {
+        const auto found = static_cast<std::size_t>(std::ranges::find(fields, key, &field::name) - fields.begin());
+        if (found == fields.size()) {
             if (!r.skip()) {
                 return false;
             }
-            continue;
-        }
-        if (!fields[next].read(r, object)) {
-            r.inside_member(fields[next].name);
+        } else if (read_field(r, object, fields[found])) {
+            seen[found] = true;
+            next = found + 1;
+        } else {
             return false;
         }
-        seen[next++] = true;
+        const auto first = next;
+        next = read_in_order(r, object, fields, first);
+        std::fill_n(seen.data() + first, next - first, true);
+        has_more = r.next_key(key);
     }
     if (!r.ok()) {
         return false;
@@ -199,7 +222,7 @@ bool read_fields(json_reader& r, void* object, std::span<const field> fields) {
     for (std::size_t i = 0; i < fields.size(); ++i) {
         if (fields[i].required && !seen[i]) {
             r.fail("is missing");
-            r.inside_member(fields[i].name);
+            r.inside_member(fields[i].name());
             return false;
         }
     }

@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <system_error>
 #include <utility>
 
@@ -176,6 +177,16 @@ bool json_reader::next_key_is(std::string_view name) noexcept {
     return true;
 }
 
+bool json_reader::next_key_is(const prepared_key& name) noexcept {
+    const auto wanted = name.text().substr(first_ ? 1 : 0); // without the comma
+    if (!ok() || !text_.substr(at_).starts_with(wanted)) {
+        return false;
+    }
+    at_ += wanted.size();
+    first_ = false;
+    return true;
+}
+
 bool json_reader::next_element() { return next(']'); }
 
 bool json_reader::literal(std::string_view word) {
@@ -206,7 +217,8 @@ bool json_reader::scan_number(std::string_view& out, bool& integral) {
 }
 
 bool json_reader::read(double& out) {
-    if (ok() && peek() == kind::number && json_detail::read_short_decimal(text_, at_, out)) {
+    skip_space();
+    if (ok() && json_detail::read_decimal(text_, at_, out)) {
         return true;
     }
     std::string_view digits;
@@ -236,6 +248,26 @@ bool json_reader::read(float& out) {
     }
     out = static_cast<float>(small); // too small for a float of full precision
     return true;
+}
+
+bool json_reader::read_or_nan(double& out) {
+    skip_space();
+    if (ok() && json_detail::read_decimal(text_, at_, out)) {
+        return true;
+    }
+    if (peek() == kind::null) {
+        out = std::numeric_limits<double>::quiet_NaN();
+        return read_null();
+    }
+    return read(out);
+}
+
+bool json_reader::read_or_nan(float& out) {
+    if (peek() == kind::null) {
+        out = std::numeric_limits<float>::quiet_NaN();
+        return read_null();
+    }
+    return read(out);
 }
 
 template <class Integer>

@@ -2,8 +2,10 @@
 #include "json/json_scan.hpp"
 
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cstdint>
+#include <limits>
 #include <string>
 
 namespace cles::json_detail {
@@ -151,10 +153,51 @@ std::string_view scan_number(std::string_view text, std::size_t& at, bool& integ
     return stop({});
 }
 
-bool read_short_decimal(std::string_view text, std::size_t& at, double& out) noexcept {
-    constexpr std::size_t max_digits = 15;
-    constexpr std::array<double, max_digits + 1> powers{1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
-                                                        1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+namespace {
+
+constexpr std::size_t max_digits = 19; // an integer of 64 bits holds them
+
+constexpr auto powers_of_ten = [] {
+    std::array<std::uint64_t, max_digits + 1> powers{};
+    std::uint64_t power = 1;
+    for (auto& each : powers) {
+        each = power;
+        power *= 10;
+    }
+    return powers;
+}();
+
+__extension__ using wide = unsigned __int128;
+
+// The double nearest to digits / 10^decimals, of two that are equally near the even one. The quotient of both, shifted
+// until their highest bit is set, has at least 63 bits; what is not in it decides only whether it is half way between
+// two doubles, or more. \pre digits is not 0
+double nearest_double(std::uint64_t digits, std::size_t decimals) noexcept {
+    constexpr int kept = std::numeric_limits<double>::digits;
+    constexpr int bias = std::numeric_limits<double>::max_exponent - 1;
+    const auto power = powers_of_ten[decimals];
+    const auto up = std::countl_zero(digits);
+    const auto down = std::countl_zero(power);
+    const auto divisor = power << static_cast<unsigned>(down);
+    const auto dividend = static_cast<wide>(digits << static_cast<unsigned>(up)) << 63U;
+    const auto quotient = static_cast<std::uint64_t>(dividend / divisor);
+    const bool has_rest = static_cast<std::uint64_t>(dividend) != quotient * divisor;
+
+    const auto excess = static_cast<unsigned>(64 - kept - std::countl_zero(quotient));
+    const auto half = std::uint64_t{1} << (excess - 1);
+    const auto beyond = quotient & (2 * half - 1);
+    auto mantissa = quotient >> excess;
+    if (beyond > half || (beyond == half && (has_rest || (mantissa & 1U) != 0))) {
+        ++mantissa;
+    }
+    const auto exponent = static_cast<std::uint64_t>(static_cast<int>(excess) + down - up - 63 + bias);
+    return static_cast<double>(mantissa) * std::bit_cast<double>(exponent << static_cast<unsigned>(kept - 1));
+}
+
+} // namespace
+
+bool read_decimal(std::string_view text, std::size_t& at, double& out) noexcept {
+    constexpr std::uint64_t most_exact = std::uint64_t{1} << static_cast<unsigned>(std::numeric_limits<double>::digits);
     const auto* const begin = text.data() + at;
     const auto* const end = text.data() + text.size();
     const auto* p = begin;
@@ -186,7 +229,10 @@ bool read_short_decimal(std::string_view text, std::size_t& at, double& out) noe
     if (p != end && (*p == 'e' || *p == 'E')) {
         return false;
     }
-    const auto value = static_cast<double>(digits) / powers[decimals];
+    const auto value = digits <= most_exact
+                           ? static_cast<double>(static_cast<std::int64_t>(digits)) /
+                                 static_cast<double>(static_cast<std::int64_t>(powers_of_ten[decimals]))
+                           : nearest_double(digits, decimals);
     out = negative ? -value : value;
     at += static_cast<std::size_t>(p - begin);
     return true;

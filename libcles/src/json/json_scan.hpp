@@ -69,10 +69,11 @@ bool read_number(std::string_view text, Number& n) noexcept {
 
 std::string_view scan_number(std::string_view text, std::size_t& at, bool& integral) noexcept;
 
-/// Reads a number of the usual form, up to 15 digits and no exponent, exactly and quickly. False for any other, valid
-/// or not; then `at` stays. Such a number is a quotient of two integers that a double holds exactly, so one division
-/// rounds it correctly (Clinger 1990, "How to read floating point numbers accurately").
-bool read_short_decimal(std::string_view text, std::size_t& at, double& out) noexcept;
+/// Reads a number of the usual form, up to 19 digits and no exponent, exactly and quickly. False for any other, valid
+/// or not; then `at` stays. Such a number is a quotient of two integers. If a double holds both exactly, which is so up
+/// to 15 digits, one division rounds it correctly (Clinger 1990, "How to read floating point numbers accurately");
+/// otherwise one of integers does, with its rest.
+bool read_decimal(std::string_view text, std::size_t& at, double& out) noexcept;
 
 /// `at` is the opening quote. `raw` is set to the text between the quotes, `escaped` to whether it has escapes.
 std::string_view scan_string(std::string_view text, std::size_t& at, std::string_view& raw, bool& escaped) noexcept;

@@ -7,9 +7,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
 
 namespace cles {
 namespace {
+
+constexpr auto two_digits = [] {
+    std::array<char, 200> text{};
+    for (std::size_t i = 0; i < text.size(); i += 2) {
+        text[i] = static_cast<char>('0' + i / 20);
+        text[i + 1] = static_cast<char>('0' + i / 2 % 10);
+    }
+    return text;
+}();
 
 // Most measurements have few decimals, which this writes several times faster than the general algorithm. A decimal of
 // at most 15 digits is the only such decimal that reads back as the same double, so one that does, without trailing
@@ -27,11 +39,10 @@ bool append_short_decimal(std::string& out, double d) {
         if (!(scaled < most)) {
             return false;
         }
-        const auto rounded = std::nearbyint(scaled);
-        if (rounded / s.factor != magnitude) {
+        auto digits = static_cast<std::uint64_t>(static_cast<std::int64_t>(scaled + 0.5));
+        if (static_cast<double>(static_cast<std::int64_t>(digits)) / s.factor != magnitude) {
             continue;
         }
-        auto digits = static_cast<std::uint64_t>(rounded);
         auto decimals = s.decimals;
         while (decimals != 0 && digits % 10 == 0) {
             digits /= 10;
@@ -40,11 +51,29 @@ bool append_short_decimal(std::string& out, double d) {
         std::array<char, 32> text;
         auto* const last = text.data() + text.size();
         auto* p = last;
-        for (unsigned n = 0; digits != 0 || n <= decimals; ++n, digits /= 10) {
-            if (n == decimals && decimals != 0) {
-                *--p = '.';
-            }
+        const auto put_two = [&p, &digits] {
+            p -= 2;
+            std::memcpy(p, two_digits.data() + 2 * (digits % 100), 2);
+            digits /= 100;
+        };
+        const auto put_one = [&p, &digits] {
             *--p = static_cast<char>('0' + digits % 10);
+            digits /= 10;
+        };
+        if (decimals != 0) {
+            for (; decimals >= 2; decimals -= 2) {
+                put_two();
+            }
+            if (decimals != 0) {
+                put_one();
+            }
+            *--p = '.';
+        }
+        while (digits >= 10) {
+            put_two();
+        }
+        if (digits != 0 || p == last || *p == '.') {
+            put_one();
         }
         if (std::signbit(d)) {
             *--p = '-';

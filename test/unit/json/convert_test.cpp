@@ -455,7 +455,9 @@ BOOST_AUTO_TEST_CASE(a_described_struct_is_an_object_of_its_members_in_their_ord
 BOOST_AUTO_TEST_CASE(members_may_come_in_any_order_and_with_white_space_and_escapes) {
     for (const std::string_view text :
          {"{\"lon\":2,\"lat\":1}", " { \"lat\" : 1 , \"lon\" : 2 } ", "{\"l\\u0061t\":1,\"lon\":2}",
-          "{\"lat\":1, \"lon\":2}", "{\"lon\":2 ,\"lat\":1}", "{\"lat\":1,\"x\":[{}],\"lon\":2}"}) {
+          "{\"lat\":1, \"lon\":2}", "{\"lon\":2 ,\"lat\":1}", "{\"lat\":1,\"x\":[{}],\"lon\":2}",
+          "{\"x\":3,\"lat\":1,\"lon\":2}", "{\"lat\":1,\"lon\":2,\"x\":3}",
+          "{\"lat\":3,\"lon\":3,\"lon\":2,\"lat\":1}"}) {
         const auto p = from_json<point>(text);
         BOOST_TEST(p.lat == 1.0, text);
         BOOST_TEST(p.lon == 2.0, text);

@@ -310,6 +310,40 @@ BOOST_AUTO_TEST_CASE(an_expected_key_is_consumed_only_if_it_is_next) {
     BOOST_TEST(reader.at_end());
 }
 
+BOOST_AUTO_TEST_CASE(so_is_a_prepared_one) {
+    static constexpr cles::prepared_key_text<1> a{"a"};
+    static constexpr cles::prepared_key_text<2> bc{"bc"};
+    cles::json_reader reader{"{\"a\":1,\"bc\":2,\"a\" :3}"};
+    std::int64_t number = 0;
+    BOOST_TEST(cles::prepared_key{bc}.name() == "bc");
+    BOOST_TEST(!reader.next_key_is(a));
+    BOOST_TEST(reader.begin_object());
+    BOOST_TEST(!reader.next_key_is(bc));
+    BOOST_TEST(reader.next_key_is(a));
+    BOOST_TEST(!reader.next_key_is(a));
+    BOOST_TEST(reader.read(number));
+    BOOST_TEST(!reader.next_key_is(a));
+    BOOST_TEST(reader.next_key_is(bc));
+    BOOST_TEST(reader.read(number));
+    BOOST_TEST(number == 2);
+    BOOST_TEST(!reader.next_key_is(a)); // white space before the colon
+    BOOST_TEST(!reader.fail("over"));
+    BOOST_TEST(!reader.next_key_is(a));
+}
+
+BOOST_AUTO_TEST_CASE(null_may_stand_for_nan) {
+    double wide = 0;
+    float narrow = 0;
+    cles::json_reader reader{"[null, null,1.5,-2.5e1,\"x\"]"};
+    BOOST_TEST(reader.begin_array());
+    BOOST_TEST((reader.next_element() && reader.read_or_nan(wide) && std::isnan(wide)));
+    BOOST_TEST((reader.next_element() && reader.read_or_nan(narrow) && std::isnan(narrow)));
+    BOOST_TEST((reader.next_element() && reader.read_or_nan(wide) && wide == 1.5));
+    BOOST_TEST((reader.next_element() && reader.read_or_nan(narrow) && narrow == -25.0F));
+    BOOST_TEST((reader.next_element() && !reader.read_or_nan(wide)));
+    BOOST_TEST(reader.error() == "expected a number, got a string (at byte 23)");
+}
+
 BOOST_AUTO_TEST_CASE(a_value_can_be_skipped_or_taken_as_text) {
     cles::json_reader reader{"[ {\"a\": [1, \"]\"]} , \"x\" , 5 ]"};
     std::string_view raw;

@@ -3,7 +3,11 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <bit>
+#include <charconv>
 #include <cstddef>
+#include <cstdint>
+#include <random>
 #include <string>
 #include <string_view>
 
@@ -68,26 +72,60 @@ BOOST_AUTO_TEST_CASE(errors_in_a_number_are_reported) {
     BOOST_TEST(number("1e+") == "an exponent without a digit");
 }
 
-BOOST_AUTO_TEST_CASE(a_short_decimal_has_15_digits_at_most_and_no_exponent) {
+BOOST_AUTO_TEST_CASE(a_decimal_of_the_usual_form_has_19_digits_at_most_and_no_exponent) {
     const auto takes = [](std::string_view text) {
         std::size_t at = 0;
         double out = 0;
-        return cles::json_detail::read_short_decimal(text, at, out);
+        return cles::json_detail::read_decimal(text, at, out);
     };
     for (const std::string_view quick :
-         {"0", "-0", "7", "123456789012345", "-0.00000000000001", "12345678901234.5,", "45.1]"}) {
+         {"0", "-0", "7", "1234567890123456789", "-0.000000000000000001", "123456789012345678.5,", "45.1]"}) {
         BOOST_TEST(takes(quick), quick);
     }
     for (const std::string_view other :
-         {"", "-", "01", "1234567890123456", "0.123456789012345", "1.", "1e5", "1.5E5", "x",
+         {"", "-", "01", "12345678901234567890", "0.1234567890123456789", "1.", "1e5", "1.5E5", "x",
           "99999999999999999999999999999999999999", "0.00000000000000000000000000001"}) {
         BOOST_TEST(!takes(other), other); // left for the general algorithm
     }
     std::size_t at = 1;
     double out = 0;
-    BOOST_TEST(cles::json_detail::read_short_decimal("[-45.125]", at, out));
+    BOOST_TEST(cles::json_detail::read_decimal("[-45.125]", at, out));
     BOOST_TEST(out == -45.125);
     BOOST_TEST(at == 8U);
+}
+
+// As the standard library does, which rounds correctly: half way between two doubles, to the even one.
+BOOST_AUTO_TEST_CASE(a_decimal_of_the_usual_form_is_the_nearest_double) {
+    std::mt19937_64 draw{20261130};
+    const auto check = [](const std::string& text) {
+        std::size_t at = 0;
+        double out = 0;
+        double nearest = 0;
+        BOOST_REQUIRE_MESSAGE(cles::json_detail::read_decimal(text, at, out), text);
+        std::from_chars(text.data(), text.data() + text.size(), nearest);
+        BOOST_REQUIRE_MESSAGE(std::bit_cast<std::uint64_t>(out) == std::bit_cast<std::uint64_t>(nearest), text);
+    };
+    const auto with_point = [](std::string digits, std::size_t decimals) {
+        if (digits.size() <= decimals) {
+            digits.insert(0, decimals + 1 - digits.size(), '0');
+        }
+        return decimals == 0 ? digits : digits.insert(digits.size() - decimals, ".");
+    };
+    constexpr std::uint64_t over = 10'000'000'000'000'000'000U;
+    for (int i = 0; i < 200'000; ++i) {
+        auto number = draw() % over;
+        for (auto shorter = draw() % 19; shorter != 0; --shorter) {
+            number /= 10;
+        }
+        const auto digits = std::to_string(number);
+        check(with_point(digits, draw() % digits.size()));
+    }
+    for (const auto* half :
+         {"9007199254740993", "9007199254740995", "-9007199254740993.0", "4503599627370497.5", "4503599627370496.5",
+          "9007199254740992.999", "9223372036854775808", "9223372036854775807", "9223372036854776832",
+          "9223372036854777856", "9999999999999999999", "0.100000000000000005"}) {
+        check(half);
+    }
 }
 
 BOOST_AUTO_TEST_CASE(a_string_ends_at_its_quote) {
