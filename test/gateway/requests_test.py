@@ -67,7 +67,7 @@ class Requests(unittest.TestCase):
     def test_the_page(self):
         reply = self.gateway.get("/")
         self.assertEqual((reply.status, reply.headers["Content-Type"]), (200, "text/html; charset=utf-8"))
-        self.assertIn("default-src 'self'", reply.headers["Content-Security-Policy"])
+        self.assertIn("default-src 'none'", reply.headers["Content-Security-Policy"])
         self.assertEqual(self.good(self.gateway.get("/session")), {"node": "gateway", "name": "", "secured": False})
 
     def test_several_requests_on_one_connection(self):

@@ -14,11 +14,14 @@ namespace {
 using cles::errc;
 
 // No page of another origin may frame or embed what is served, and nothing keeps a copy of it.
-constexpr std::string_view common_fields = "Cache-Control: no-store\r\n"
-                                           "X-Content-Type-Options: nosniff\r\n"
-                                           "Referrer-Policy: no-referrer\r\n"
-                                           "Cross-Origin-Resource-Policy: same-origin\r\n"
-                                           "Content-Security-Policy: default-src 'self'; frame-ancestors 'none'\r\n";
+constexpr std::string_view common_fields =
+    "Cache-Control: no-store\r\n"
+    "X-Content-Type-Options: nosniff\r\n"
+    "Referrer-Policy: no-referrer\r\n"
+    "Cross-Origin-Resource-Policy: same-origin\r\n"
+    "Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; "
+    "img-src 'self'; connect-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'\r\n";
 
 struct reason {
     int status;

@@ -7,22 +7,17 @@
 namespace gateway {
 namespace {
 
-constexpr std::string_view front_page = R"(<!doctype html>
-<html lang="en">
-<meta charset="utf-8">
-<title>CLES gateway</title>
-<h1>CLES gateway</h1>
-<p>This gateway passes requests to the nodes of a CLES network:</p>
-<ul>
-<li><a href="/openapi.json">what these nodes offer</a>, as OpenAPI</li>
-<li><a href="/pull/all/cles">the nodes themselves</a></li>
-<li><a href="/metrics">their metrics</a></li>
-</ul>
-</html>
-)";
+using namespace std::string_view_literals;
 
-// Add the files of a page here.
-constexpr std::array assets{asset{"/", "text/html; charset=utf-8", front_page}};
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Woverlength-strings" // the standard requires 65,536 bytes, compilers take more
+
+// The page of the gateway: apps/gateway/page, bundled.
+constexpr std::array assets{
+#include "assets.inc"
+};
+
+#pragma GCC diagnostic pop
 
 } // namespace
 

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: BSL-1.0
+
+# Writes what serve/assets.cpp includes: the files of the page. cmake -D page=FOLDER -D out=FILE [-D app=BUNDLE
+# -D licences=FILES] -P embed.cmake. Without a bundle, the page says how to get one.
+
+function(embed path type text)
+    set(mark "--page--")
+    string(FIND "${text}" ")${mark}\"" found)
+    if(NOT found EQUAL -1)
+        message(FATAL_ERROR "${path} contains the end of a raw string")
+    endif()
+    file(APPEND "${out}.new" "asset{\"${path}\", \"${type}\", R\"${mark}(${text})${mark}\"sv},\n")
+endfunction()
+
+file(WRITE "${out}.new" "// Made of apps/gateway/page.\n")
+if(DEFINED app)
+    file(READ "${page}/index.html" html)
+    file(READ "${page}/icon.svg" icon)
+    file(READ "${app}.js" script)
+    file(READ "${app}.css" style)
+    set(notice "The dashboard contains Preact and dygraphs. Their licences follow, as Debian states them.\n")
+    foreach(file IN LISTS licences)
+        file(READ "${file}" text)
+        string(APPEND notice "\n----------------------------------------\n\n${text}")
+    endforeach()
+    embed("/" "text/html; charset=utf-8" "${html}")
+    embed("/app.js" "text/javascript; charset=utf-8" "/* Licences: /licences.txt */ ${script}")
+    embed("/app.css" "text/css; charset=utf-8" "/* Licences: /licences.txt */ ${style}")
+    embed("/icon.svg" "image/svg+xml" "${icon}")
+    embed("/licences.txt" "text/plain; charset=utf-8" "${notice}")
+else()
+    file(READ "${page}/without.html" html)
+    embed("/" "text/html; charset=utf-8" "${html}")
+endif()
+file(RENAME "${out}.new" "${out}")
