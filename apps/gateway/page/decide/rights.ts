@@ -29,8 +29,7 @@ export function rosterIn(reply: Json): Roster | null {
     return { version: Number(told.version), members };
 }
 
-const escaped = (text: string): string => text.replace(/[.+?^${}()|[\]\\/]/g, "\\$&");
-const wildcard = (pattern: string): RegExp => new RegExp(`^${pattern.split("*").map(escaped).join(".*")}$`, "su");
+const escaped = (text: string): string => text.replace(/[.*+?^${}()|[\]\\/]/g, "\\$&");
 
 function decoded(text: string): string {
     try {
@@ -48,10 +47,11 @@ export function permits(right: string, verb: string, node: string, path: string[
     }
     const isOpen = found[3].endsWith("/**");
     const parts = (isOpen ? found[3].slice(0, -3) : found[3]).split("/");
-    if ((found[2] + parts.join("/")).includes("**") || (isOpen ? path.length < parts.length : path.length !== parts.length)) {
+    if ([found[2], ...parts].some((part) => part.includes("**")) || (isOpen ? path.length < parts.length : path.length !== parts.length)) {
         return false;
     }
-    const matches = (pattern: string, text: string): boolean => wildcard(pattern.split("*").map(decoded).join("*")).test(text);
+    const matches = (pattern: string, text: string): boolean => // an escaped '*' is the character
+        new RegExp(`^${pattern.split("*").map((part) => escaped(decoded(part))).join(".*")}$`, "su").test(text);
     return matches(found[2], node) && parts.every((part, i) => matches(part, path[i]));
 }
 
