@@ -67,7 +67,7 @@ if DECISIONS:
         def test_they_name_no_other_host(self):
             for path in ("/", "/app.js", "/app.css", "/icon.svg"):
                 body = self.gateway.get(path).body
-                self.assertEqual(set(re.findall(r"(?:https?|wss?):/*[^\s\"'`)>]+", body)) - NAMESPACES, set(), path)
+                self.assertEqual(set(re.findall(r"(?:https?|wss?)://[^\s\"'`)>]+", body)) - NAMESPACES, set(), path)
                 self.assertEqual(re.findall(r"""["'(=]//[a-z0-9]""", body), [], path)
             self.assertNotIn("@import", self.gateway.get("/app.css").body)
 

@@ -47,7 +47,7 @@ class FleetMap extends Component<MapProps, { chosen: string; wide: number }> {
                     {layout.boxes.map((box) => (
                         <g>
                             <rect class="pool" x={box.x} y={box.y} width={box.width} height={box.height} rx="12" />
-                            <text class="pool" x={box.x + 12} y={box.y + 19}>{box.pool === "" ? "pool without a name" : `pool ${box.pool}`}</text>
+                            <text class="pool" x={box.x + 12} y={box.y + 19}>{box.pool !== "" ? `pool ${box.pool}` : names.length > 1 ? "no pool" : ""}</text>
                         </g>
                     ))}
                     {this.edges(layout).map((edge) => {
@@ -109,13 +109,16 @@ export function FleetView({ fleet, session, now, forget }: ViewProps & { forget:
     return (
         <div>
             <h1>The fleet <small>{count(live, "node")} live{nodes.length > live ? `, ${nodes.length - live} not` : ""}</small></h1>
-            {nodes.length === 0 ? <Empty text="No node has answered yet. Start one: cles serve" /> : <FleetMap fleet={fleet} nodes={shown} gateway={session.node} />}
-            <p class="key">
-                A line: one node hears the other (dotted: through others; dashed: not at the moment). A ring: how many workers are busy.
-                A number: jobs that wait. A square: this gateway.
-                {shown.length > mostWithEdges ? " Point at a node to see its lines." : ""}
-            </p>
-            <div class="columns">
+            {nodes.length === 0 ? <Empty text="No node has answered yet. Start one: cles serve" /> : null}
+            <div class={`columns ${shown.length > 10 || new Set(shown.map((node) => node.pool)).size > 1 ? "wide" : ""}`}>
+                <section>
+                    {nodes.length === 0 ? null : <FleetMap fleet={fleet} nodes={shown} gateway={session.node} />}
+                    <p class="key">
+                        A line: one node hears the other (dotted: through others; dashed: not at the moment). A ring: how many workers are
+                        busy. A number: jobs that wait. A square: this gateway.
+                        {shown.length > mostWithEdges ? " Point at a node to see its lines." : ""}
+                    </p>
+                </section>
                 <section>
                     <h2>Nodes</h2>
                     <Table label="Nodes" heads={["node", "pool", "state", "#running", "#queued", "#workers", "up", "version", ""]} rows={nodes.map((node) => [
@@ -128,8 +131,6 @@ export function FleetView({ fleet, session, now, forget }: ViewProps & { forget:
                     {fleet.pools.length > 0 ? <h2>Pools that bridges reach</h2> : null}
                     {fleet.pools.length > 0 ? <Table label="Pools" heads={["bridge", "pool", "state", "#nodes"]}
                         rows={fleet.pools.map((each) => [<NodeLink name={each.bridge} />, each.pool || "–", each.state, each.nodes])} /> : null}
-                </section>
-                <section>
                     <h2>What has happened</h2>
                     <Notes fleet={fleet} />
                 </section>

@@ -36,7 +36,7 @@ function TrackMap({ series, theme }: { series: Series; theme: string }) {
                         <g key={name}>
                             <polyline points={points.map(([px, py]) => `${at(px).toFixed(1)},${at(-py).toFixed(1)}`).join(" ")} stroke={colourOf(i, theme)} />
                             <circle cx={at(x)} cy={at(-y)} r="5" fill={colourOf(i, theme)} />
-                            <text x={at(x) + 8} y={at(-y) + 4}>{name}</text>
+                            <text x={at(x) + (x > 0 ? -8 : 8)} y={at(-y) - 6} text-anchor={x > 0 ? "end" : "start"}>{name}</text>
                         </g>
                     );
                 })}

@@ -116,9 +116,10 @@ export class Plot extends Component<PlotProps, { hovered: number }> {
 
     render() {
         const { title, unit, labels, rows, theme } = this.props;
-        const row = rows[this.state.hovered] ?? rows[rows.length - 1];
-        const valueAt = (i: number): string => {
-            const value = row?.[i + 1];
+        const at = rows[this.state.hovered] ? this.state.hovered : rows.length - 1;
+        const valueAt = (i: number): string => { // that row may be of another publisher
+            const found = rows.slice(Math.max(0, at - 64), at + 1).reverse().find((row) => row[i + 1] !== null);
+            const value = found?.[i + 1];
             return typeof value === "number" && Number.isFinite(value) ? numberText(value) : "–";
         };
         return (
