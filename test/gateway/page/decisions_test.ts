@@ -118,7 +118,7 @@ test("a clash, and counters of trouble, are told", () => {
     equal(problems(fleet, 0), [], "what was before is not news:");
     fleet = fleetAfter(fleet, answers({ car1: identity("car1") }, { metrics: metrics(7, 1), peers }), 1000);
     equal(problems(fleet, 1000).map((each) => `${each.kind}: ${each.text}`),
-        ["clash: two nodes have this name", "refused: 1 links refused at the limit", "drop: 2 updates dropped for slow subscribers"]);
+        ["clash: two nodes have this name", "refused: links refused at the limit: 1", "drop: updates dropped for slow subscribers: 2"]);
     fleet = fleetAfter(fleet, answers({ car1: identity("car1", "2") }, { metrics: metrics(0, 0) }), 2000);
     fleet = fleetAfter(fleet, answers({ car1: identity("car1", "2") }, { metrics: metrics(0, 0) }), 3000);
     equal(problems(fleet, 90_000), [], "a minute later, and after a restart:");
@@ -264,7 +264,17 @@ test("a stream that lasts takes no more and more memory", () => {
             series.take({ type: "gap", id: "", data: '{"missed":1}' }, i * 20);
         }
     }
-    equal([series.rows.length <= 6000, series.marks.length <= 100, series.tracks[""].points.length <= 2000, Math.round(series.rate(50_000 * 20))], [true, true, true, 50]);
+    equal([series.rows.length <= 6000, series.marks.length <= 100, series.tracks[""].points.length <= 2000, Math.round(series.rates(50_000 * 20).arrive)], [true, true, true, 50]);
+});
+
+test("updates that come faster than they can be shown take each other's place, and are counted", () => {
+    const series = new Series(false, 60_000);
+    for (let i = 0; i < 100_000; ++i) {
+        series.take(update(2 * i + 1, { v: i }), 1_000_000 + Math.floor(i / 10));
+    }
+    equal([series.rows.length, series.rows[0][0], series.rows[999][1]], [1000, 1_000_000, 99_999]);
+    const { arrive, published } = series.rates(1_010_000);
+    equal([Math.round(arrive / 100), Math.round(published / 100)], [100, 200]);
 });
 
 test("a position is found where it is, and only if it is one", () => {

@@ -253,7 +253,7 @@ export function problems(fleet: Fleet, now: number): { kind: Note["kind"]; text:
         }
     }
     const counted = [...sums.values()].sort((a, b) => b.kind.localeCompare(a.kind) || b.by - a.by);
-    return [...found, ...counted.map((each) => ({ kind: each.kind, node: each.node, text: `${each.by} ${each.text}` }))];
+    return [...found, ...counted.map((each) => ({ kind: each.kind, node: each.node, text: `${each.text}: ${each.by}` }))];
 }
 
 export const sortedNodes = (fleet: Fleet): FleetNode[] =>

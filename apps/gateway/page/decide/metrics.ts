@@ -35,7 +35,6 @@ export const troubles: { path: string; kind: "drop" | "refused"; text: string }[
     { path: "datagrams_unsealed", kind: "refused", text: "datagrams of strangers dropped: not sealed" },
     { path: "group_unopened", kind: "refused", text: "datagrams of strangers dropped: not of this fleet" },
     { path: "group_copied", kind: "refused", text: "copied datagrams dropped" },
-    { path: "granted_jobs_refused", kind: "refused", text: "jobs of other nodes refused" },
     { path: "federation.messages_refused", kind: "refused", text: "messages of other pools refused" },
     { path: "gateway.denied", kind: "refused", text: "HTTP requests refused: host, origin or token" },
     { path: "gateway.connections_refused", kind: "refused", text: "HTTP connections refused at the limit" },

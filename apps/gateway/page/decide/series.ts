@@ -66,7 +66,7 @@ export class Series {
     failure = "";
     private epoch = "";
     private seq = 0;
-    private times: number[] = []; // of the last updates
+    private counted: { at: number; received: number; published: number }[] = []; // over the last seconds
 
     constructor(private isOfAll: boolean, private spanMs = 60_000) {}
 
@@ -106,10 +106,12 @@ export class Series {
         }
     }
 
-    /** Updates a second that arrive here, over the last ones. */
-    rate(now: number): number {
-        const first = this.times[0];
-        return first === undefined || this.times.length < 2 ? 0 : (this.times.length - 1) / Math.max((now - first) / 1000, 0.001);
+    /** Updates a second over the last seconds: those that arrive here, and those that were published. */
+    rates(now: number): { arrive: number; published: number } {
+        const first = this.counted.find((each) => now - each.at < 4000);
+        const seconds = first === undefined ? 0 : (now - first.at) / 1000;
+        return first === undefined || seconds < 0.2 ? { arrive: 0, published: 0 }
+            : { arrive: (this.received - first.received) / seconds, published: (this.published - first.published) / seconds };
     }
 
     private takeUpdate(event: SentEvent, data: Json, now: number): void {
@@ -120,11 +122,11 @@ export class Series {
         }
         this.isLost = false;
         this.failure = "";
-        ++this.received;
-        this.times.push(now);
-        while (this.times.length > 2 && (this.times.length > 200 || now - this.times[0] > 3000)) {
-            this.times.shift();
+        if (now - (this.counted[this.counted.length - 1]?.at ?? -Infinity) >= 100) {
+            this.counted.push({ at: now, received: this.received, published: this.published });
+            this.counted.splice(0, this.counted.findIndex((each) => now - each.at < 3000));
         }
+        ++this.received;
         const mark = markOf(event.id);
         if (mark) {
             this.published += mark.epoch === this.epoch && mark.seq > this.seq ? mark.seq - this.seq : 1;
@@ -146,7 +148,10 @@ export class Series {
     }
 
     private addRow(publisher: string, scalars: Map<string, Json>, now: number): void {
-        const row: (number | null)[] = [now, ...this.names.map(() => null)];
+        // More rows than the plot has points for are not kept: an update then takes the place of the one before it.
+        const last = this.rows[this.rows.length - 1];
+        const isSoon = last !== undefined && now - numberOf(last[0]) < this.spanMs / mostRows && !last.some((value) => Number.isNaN(value));
+        const row: (number | null)[] = isSoon ? last : [now, ...this.names.map(() => null)];
         for (const [path, value] of scalars) {
             if (typeof value !== "number") {
                 continue;
@@ -155,8 +160,10 @@ export class Series {
             let at = this.names.indexOf(name);
             if (at < 0 && this.names.length < mostNames) {
                 at = this.names.push(name) - 1;
-                row.push(null);
                 this.rows.forEach((each) => each.push(null));
+                if (!isSoon) {
+                    row.push(null);
+                }
             }
             if (at >= 0) {
                 row[at + 1] = value;
@@ -164,7 +171,9 @@ export class Series {
                 this.ranges.set(name, { least: Math.min(range?.least ?? value, value), most: Math.max(range?.most ?? value, value) });
             }
         }
-        this.rows.push(row);
+        if (!isSoon) {
+            this.rows.push(row);
+        }
         const stale = this.rows.findIndex((each) => numberOf(each[0]) >= now - this.spanMs);
         if (stale > 50 || this.rows.length > mostRows) {
             this.rows.splice(0, Math.max(stale, this.rows.length - mostRows));

@@ -95,7 +95,7 @@ export function Notes({ fleet, node }: { fleet: Fleet; node?: string }) {
             {notes.map((note) => (
                 <li>
                     <time>{clockText(note.at)}</time> <span class={`tag ${note.kind}`}>{sentences[note.kind]}</span>{" "}
-                    <NodeLink name={note.node} /> {note.by > 0 ? `${note.by} ` : ""}{note.text}
+                    <NodeLink name={note.node} /> {note.text}{note.by > 0 ? `: ${note.by}` : ""}
                 </li>
             ))}
         </ul>

@@ -89,7 +89,7 @@ export class NodeView extends Component<ViewProps, NodeViewState> {
                     <Stat name="pool" value={node.pool || "–"} />
                 </div>
                 {wrong.length > 0 ? <ul class="problems">{wrong.map((each) => (
-                    <li class={`chip ${each.kind}`}>{numberText(node.flat?.get(each.path) ?? 0)} {each.text}, since its start</li>
+                    <li class={`chip ${each.kind}`}>{each.text}, since its start: {numberText(node.flat?.get(each.path) ?? 0)}</li>
                 ))}</ul> : null}
                 <div class="columns">
                     <section><h2>Nouns it publishes</h2>{this.nouns()}</section>

@@ -141,7 +141,7 @@ export class NounView extends Component<ViewProps, NounState> {
                 const range = this.series.ranges.get(publisher === "" ? path : `${publisher} ${path}`);
                 const isTime = typeof value === "number" && isInstant(value, unit);
                 return [...(this.isOfAll() ? [publisher] : []), path || "value", valueText(value, unit), isTime ? "" : unit,
-                    range && !isTime ? numberText(range.least) : "", range && !isTime ? numberText(range.most) : "", description];
+                    range && !isTime ? valueText(range.least) : "", range && !isTime ? valueText(range.most) : "", description];
             }));
         return <Table label="Values" heads={[...(this.isOfAll() ? ["node"] : []), "value of", "#now", "unit", "#least", "#most", "meaning"]} rows={rows.slice(0, 300)} />;
     }
@@ -150,8 +150,7 @@ export class NounView extends Component<ViewProps, NounState> {
         const [node, ...noun] = parts;
         const series = this.series;
         const { every, spanMs, isPaused, wrong } = this.state;
-        const rate = series.rate(Date.now());
-        const published = series.received > 1 ? (rate * series.published) / series.received : rate;
+        const { arrive, published } = series.rates(Date.now());
         const trouble = wrong || series.failure || (series.isLost ? "The publisher is not there. The gateway tries again." : "");
         return (
             <div>
@@ -168,7 +167,7 @@ export class NounView extends Component<ViewProps, NounState> {
                 </div>
                 {trouble !== "" ? <p class="warning" role="alert">{trouble}</p> : null}
                 <div class="stats">
-                    <Stat name="arrive" value={rateText(rate)} />
+                    <Stat name="arrive" value={rateText(arrive)} />
                     {this.isOfAll() ? null : <Stat name="published" value={rateText(published)} hint="As the numbers of the updates tell" />}
                     <Stat name="thinned to" value={this.every() > 0 ? `1 in ${this.every()} ms` : "not"} hint="By the gateway, so that the browser keeps up" />
                     <Stat name="missed" value={this.every() > 0 && series.missed === 0 ? "not told if thinned" : numberText(series.missed)} />

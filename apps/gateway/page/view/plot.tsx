@@ -97,6 +97,7 @@ export class Plot extends Component<PlotProps, { hovered: number }> {
     }
 
     private drawMarks(canvas: CanvasRenderingContext2D, area: { x: number; y: number; w: number; h: number }, graph: Dygraph): void {
+        let labelled = -Infinity;
         for (const mark of this.props.marks ?? []) {
             const x = graph.toDomXCoord(mark.at);
             if (x >= area.x && x <= area.x + area.w) {
@@ -108,7 +109,10 @@ export class Plot extends Component<PlotProps, { hovered: number }> {
                 canvas.lineTo(x, area.y + area.h);
                 canvas.stroke();
                 canvas.font = "11px sans-serif";
-                canvas.fillText(mark.kind, Math.min(x + 3, area.x + area.w - 34), area.y + 11);
+                if (mark.kind !== "back" && (mark.kind === "restart" || x - labelled > 32)) { // "back" ends what the one before says
+                    labelled = x;
+                    canvas.fillText(mark.kind, Math.min(x + 3, area.x + area.w - 36), area.y + (mark.kind === "restart" ? 23 : 11));
+                }
                 canvas.restore();
             }
         }
