@@ -124,6 +124,16 @@ test("a clash, and counters of trouble, are told", () => {
     equal(problems(fleet, 90_000), [], "a minute later, and after a restart:");
 });
 
+test("a counter that rises all the time leaves room for the rest", () => {
+    let fleet = fleetAfter(emptyFleet(0), answers({ car1: identity("car1"), car2: identity("car2") }, { metrics: { car1: { links_refused: 0 } } }), 0);
+    for (let second = 1; second <= 7200; ++second) {
+        const nodes: Record<string, Json> = second === 5 ? { car1: identity("car1") } : { car1: identity("car1"), car2: identity("car2") };
+        fleet = fleetAfter(fleet, answers(nodes, { metrics: { car1: { links_refused: 3 * second } } }), second * 1000);
+    }
+    equal(kinds(fleet).filter((note) => note.startsWith("car2")), ["car2 left", "car2 back"]);
+    equal([fleet.notes.length <= 200, fleet.notes[fleet.notes.length - 1].by > 60], [true, true]);
+});
+
 test("nodes may tell anything of themselves", () => {
     const odd = { "__proto__x": { node: 7, tasks: "none", load: [], endpoints: [1, null] }, car1: "text", car2: { tasks: [{ task: 3 }, null, { verb: "PULL", task: "a" }] } };
     const fleet = fleetAfter(emptyFleet(0), answers(odd as Record<string, Json>, { peers: { car2: { peers: [null, 3] } }, metrics: { car2: { a: { b: "c", d: 1 } } } }), 0);

@@ -59,7 +59,7 @@ export const emptyFleet = (now: number): Fleet => ({
     nodes: emptyRecord(), edges: [], pools: [], notes: [], failure: "", startedAt: now,
 });
 
-const mostNotes = 200;
+const mostNotes = 100; // and as many again that count something
 const mostSamples = 600;
 const mostNodes = 2000;
 
@@ -174,7 +174,7 @@ export function fleetAfter(fleet: Fleet, answers: Answers, now: number): Fleet {
     const names = new Set([...Object.keys(fleet.nodes), ...Object.keys(results), ...Object.keys(errors)]);
     for (const name of [...names].slice(0, mostNodes)) {
         const before = fleet.nodes[name];
-        const add = (kind: Note["kind"], text: string, by = 0): number => notes.push({ at: now, kind, node: name, text, by });
+        const add = (kind: Note["kind"], text: string, by = 0): void => addNote(notes, { at: now, kind, node: name, text, by });
         const told = results[name];
         let after: FleetNode;
         if (isObject(told)) {
@@ -196,7 +196,7 @@ export function fleetAfter(fleet: Fleet, answers: Answers, now: number): Fleet {
         }
         nodes[name] = after;
     }
-    return { nodes, edges, pools: poolsIn(metrics), notes: notes.slice(-mostNotes), failure: "", startedAt: fleet.startedAt };
+    return { nodes, edges, pools: poolsIn(metrics), notes: withoutOld(notes), failure: "", startedAt: fleet.startedAt };
 }
 
 function takeMetrics(node: FleetNode, before: FleetNode | undefined, told: Json | undefined, now: number,
@@ -213,6 +213,22 @@ function takeMetrics(node: FleetNode, before: FleetNode | undefined, told: Json 
     node.metrics = told;
     node.flat = flat;
     node.samples = [...node.samples.slice(1 - mostSamples), sampleOf(flat, now)];
+}
+
+/** What is counted again within half a minute is added to its note. */
+function addNote(notes: Note[], note: Note): void {
+    const at = note.by === 0 ? -1 : notes.findIndex((each) => each.node === note.node && each.text === note.text && note.at - each.at < 30_000);
+    if (at >= 0) {
+        notes[at] = { ...notes[at], by: notes[at].by + note.by };
+    } else {
+        notes.push(note);
+    }
+}
+
+/** Counters that rise all the time leave the rest. */
+function withoutOld(notes: Note[]): Note[] {
+    const [counted, others] = [notes.filter((note) => note.by > 0), notes.filter((note) => note.by === 0)];
+    return [...counted.slice(-mostNotes), ...others.slice(-mostNotes)].sort((a, b) => a.at - b.at);
 }
 
 function poolsIn(metrics: JsonObject): Fleet["pools"] {
