@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSL-1.0
 
-# Writes what serve/assets.cpp includes: the files of the page. cmake -D page=FOLDER -D out=FILE [-D app=BUNDLE
-# -D licences=FILES] -P embed.cmake. Without a bundle, the page says how to get one.
+# Writes what serve/assets.cpp includes: the files of the page. cmake -D page=FOLDER -D out=FILE [-D app=BUNDLE]
+# -P embed.cmake LICENCE... Without a bundle, the page says how to get one.
 
 function(embed path type text)
     set(mark "--page--")
@@ -19,9 +19,14 @@ if(DEFINED app)
     file(READ "${app}.js" script)
     file(READ "${app}.css" style)
     set(notice "The dashboard contains Preact and dygraphs. Their licences follow, as Debian states them.\n")
-    foreach(file IN LISTS licences)
-        file(READ "${file}" text)
-        string(APPEND notice "\n----------------------------------------\n\n${text}")
+    math(EXPR last "${CMAKE_ARGC} - 1")
+    foreach(i RANGE ${last})
+        if(after_script) # arguments are those of cmake itself up to its script
+            file(READ "${CMAKE_ARGV${i}}" text)
+            string(APPEND notice "\n----------------------------------------\n\n${text}")
+        elseif(CMAKE_ARGV${i} MATCHES "embed\\.cmake$")
+            set(after_script YES)
+        endif()
     endforeach()
     embed("/" "text/html; charset=utf-8" "${html}")
     embed("/app.js" "text/javascript; charset=utf-8" "/* Licences: /licences.txt */ ${script}")
