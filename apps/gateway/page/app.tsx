@@ -178,14 +178,14 @@ class App extends Component<Record<string, never>, AppState> {
         const found = problems(this.state.fleet, this.state.now);
         const failure = this.state.fleet.failure;
         return (
-            <ul class="problems" role="status" aria-label="What is wrong now">
+            <div role="status" aria-label="What is wrong now"><ul class="problems">
                 {failure !== "" ? <li class="chip lost"><span aria-hidden="true">✕</span> {failure}</li> : null}
                 {found.slice(0, 8).map((each) => (
                     <li class={`chip ${each.kind}`}><span aria-hidden="true">{problemSigns[each.kind]}</span> <NodeLink name={each.node} /> {each.text}</li>
                 ))}
                 {found.length > 8 ? <li class="chip">and {found.length - 8} more</li> : null}
                 {found.length === 0 && failure === "" ? <li class="chip good"><span aria-hidden="true">✓</span> no losses, clashes, refusals or drops in the last minute</li> : null}
-            </ul>
+            </ul></div>
         );
     }
 

@@ -15,7 +15,7 @@ export interface Track {
 const mostNames = 32;
 const mostRows = 6000;
 const mostMarks = 100;
-const mostPoints = 2000;
+const mostPoints = 4000; // of all tracks
 const mostPublishers = 64;
 
 /** The scalars of a value by their paths: "tyres.0.pressure". */
@@ -141,8 +141,9 @@ export class Series {
         if (position) {
             const track = (this.tracks[publisher] ??= { points: [] });
             track.points.push(position);
-            if (track.points.length > mostPoints) {
-                track.points.splice(0, mostPoints / 4);
+            const most = Math.max(100, mostPoints / Object.keys(this.tracks).length);
+            if (track.points.length > most) {
+                track.points.splice(0, Math.ceil(track.points.length - (most * 3) / 4));
             }
         }
     }

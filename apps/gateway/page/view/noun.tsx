@@ -19,7 +19,7 @@ interface NounState {
     meanings: Map<string, Meaning>;
 }
 
-const mostDraws = 100; // ms between two
+const leastPause = 100; // ms between two drawings
 
 function TrackMap({ series, theme }: { series: Series; theme: string }) {
     const { lines, half } = projected(series.tracks);
@@ -52,12 +52,21 @@ export class NounView extends Component<ViewProps, NounState> {
     private series = new Series(false);
     private stop: () => void = () => undefined;
     private timer = 0;
+    private pause = leastPause;
+    private begunWith = -1; // ms
+    private learntOf = "";
     private readonly onVisibility = (): void => (document.hidden ? this.stop() : this.begin());
 
     componentDidMount(): void {
         this.series = new Series(this.isOfAll(), this.state.spanMs);
         document.addEventListener("visibilitychange", this.onVisibility);
         this.begin();
+        void this.learnTypes();
+    }
+    componentDidUpdate(): void { // the fleet may be known only now
+        if (this.every() !== this.begunWith && !document.hidden) {
+            this.begin();
+        }
         void this.learnTypes();
     }
     componentWillUnmount(): void {
@@ -77,7 +86,7 @@ export class NounView extends Component<ViewProps, NounState> {
     private begin(): void {
         this.stop();
         const [node, task, ...parameters] = this.props.parts;
-        const every = this.every();
+        const every = this.begunWith = this.every();
         this.stop = follow(requestPath("bind", node, task ?? "", parameters) + (every > 0 ? `?every=${every}` : ""), (events) => {
             if (!this.state.isPaused) {
                 events.forEach((event) => this.series.take(event, Date.now()));
@@ -89,8 +98,11 @@ export class NounView extends Component<ViewProps, NounState> {
         if (this.timer === 0) {
             this.timer = window.setTimeout(() => {
                 this.timer = 0;
-                this.setState((state: NounState) => ({ drawn: state.drawn + 1 }));
-            }, mostDraws);
+                const begun = performance.now();
+                this.setState((state: NounState) => ({ drawn: state.drawn + 1 }), () => { // most of the time is the browser's
+                    this.pause = Math.max(leastPause, 4 * (performance.now() - begun));
+                });
+            }, this.pause);
         }
     }
     private async learnTypes(): Promise<void> {
@@ -98,7 +110,8 @@ export class NounView extends Component<ViewProps, NounState> {
         const asked = this.isOfAll() ? "any" : node;
         const nodes = Object.values(this.props.fleet.nodes);
         const one = asked === "any" ? nodes.find((each) => each.tasks.some((some) => some.verb === "BIND" && some.task === task))?.name : asked;
-        if (one !== undefined && task !== undefined) {
+        if (one !== undefined && task !== undefined && one in this.props.fleet.nodes && this.learntOf !== one) {
+            this.learntOf = one;
             const reply = await ask("GET", requestPath("pull", one, "cles", ["types", task]), { deadlineMs: 3000 });
             const told = objectOf(reply.value);
             const updates = objectOf(told.BIND).updates ?? objectOf(told.UPDATE).updates;
@@ -156,7 +169,7 @@ export class NounView extends Component<ViewProps, NounState> {
             <div>
                 <h1>{noun.join("/")} <small>of {node === "all" ? "all nodes" : <a href={hashOf("node", node)}>{node}</a>}</small></h1>
                 <div class="controls">
-                    <label>at most one update in <select value={String(every)} onChange={(event) => this.setState({ every: Number((event.target as HTMLSelectElement).value) }, () => this.begin())}>
+                    <label>at most one update in <select value={String(every)} onChange={(event) => this.setState({ every: Number((event.target as HTMLSelectElement).value) })}>
                         {[0, 20, 50, 100, 250, 1000, 5000].map((ms) => <option value={String(ms)} selected={ms === every}>{ms === 0 ? "no time: show each" : `${ms} ms`}</option>)}
                     </select></label>
                     <label>show the last <select onChange={(event) => { const ms = Number((event.target as HTMLSelectElement).value); series.setSpan(ms); this.setState({ spanMs: ms }); }}>
