@@ -255,6 +255,18 @@ test("a publisher that goes and comes back", () => {
     equal(series.received, 0);
 });
 
+test("a stream that is interrupted leaves a gap, and is told once", () => {
+    const series = new Series(false);
+    series.interrupt(0, "not yet");
+    series.take(update(1, { v: 1 }), 1000);
+    series.interrupt(1100, "the gateway does not answer");
+    series.interrupt(1200, "the gateway does not answer");
+    series.take(update(9, { v: 2 }), 2000);
+    series.interrupt(2100, "the gateway does not answer");
+    equal(series.marks.map((mark) => mark.at), [1100, 2100]);
+    equal(series.rows.map((row) => Number.isNaN(row[1])), [false, true, false, true]);
+});
+
 test("of all, each publisher has lines of its own", () => {
     const series = new Series(true);
     series.take({ type: "message", id: "", data: '{"node":"car1","update":{"lat":48,"lon":11,"v":1}}' }, 1000);

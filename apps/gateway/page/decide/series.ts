@@ -64,6 +64,7 @@ export class Series {
     missed = 0;
     isLost = false;
     failure = "";
+    private isFollowed = false; // updates have arrived since the stream began
     private epoch = "";
     private seq = 0;
     private counted: { at: number; received: number; published: number }[] = []; // over the last seconds
@@ -106,6 +107,14 @@ export class Series {
         }
     }
 
+    /** What was published meanwhile, if anything, has not arrived. */
+    interrupt(now: number, why: string): void {
+        if (this.isFollowed) {
+            this.isFollowed = false;
+            this.mark(now, "lost", why);
+        }
+    }
+
     /** Updates a second over the last seconds: those that arrive here, and those that were published. */
     rates(now: number): { arrive: number; published: number } {
         const first = this.counted.find((each) => now - each.at < 4000);
@@ -121,6 +130,7 @@ export class Series {
             return;
         }
         this.isLost = false;
+        this.isFollowed = true;
         this.failure = "";
         if (now - (this.counted[this.counted.length - 1]?.at ?? -Infinity) >= 100) {
             this.counted.push({ at: now, received: this.received, published: this.published });

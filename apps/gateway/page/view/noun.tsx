@@ -92,7 +92,12 @@ export class NounView extends Component<ViewProps, NounState> {
                 events.forEach((event) => this.series.take(event, Date.now()));
                 this.drawSoon();
             }
-        }, (wrong) => this.setState({ wrong }));
+        }, (wrong) => {
+            if (wrong !== "") {
+                this.series.interrupt(Date.now(), wrong);
+            }
+            this.setState({ wrong });
+        });
     }
     private drawSoon(): void {
         if (this.timer === 0) {
