@@ -7,8 +7,10 @@
 #include "output/end_of_output.hpp"
 #include "output/errors.hpp"
 #include "platoon/drive/drive.hpp"
+#include "platoon/drive/relay.hpp"
 #include "platoon/drive/vehicle_node.hpp"
 #include "platoon/simulate_command.hpp"
+#include "platoon/simulation/outcome.hpp"
 
 #include <CLI/CLI.hpp>
 
@@ -39,6 +41,8 @@ struct arguments {
     std::size_t turn = 0, turns = 1;
     std::int64_t start_ns = 0;
     double start_utc = 0;
+    std::string exchange{}, listen{};
+    std::vector<int> devices{};
 
     [[nodiscard]] platoon::driver_setup setup() const {
         return {.hz = hz,
@@ -173,33 +177,34 @@ int run(const arguments& args) {
 }
 
 int vehicle(const arguments& args) {
-    platoon::vehicle_options options{.setup = args.setup(),
+    platoon::vehicle_options options{.setup = {.driving = args.setup(),
+                                               .turn = args.turn,
+                                               .turns = args.turns,
+                                               .start_utc = args.start_utc,
+                                               .seed = args.seed,
+                                               .separate_truth = !args.exchange.empty()},
                                      .joins = !args.lead && args.ahead.empty(),
                                      .behind = args.behind,
-                                     .turn = args.turn,
-                                     .turns = args.turns,
                                      .start_ns = args.start_ns,
-                                     .start_utc = args.start_utc,
                                      .seconds = args.seconds,
-                                     .losses = args.losses(),
-                                     .delay = args.delay_ms / 1000,
-                                     .seed = args.seed,
                                      .group = args.group_options(),
                                      .insecure = args.insecure,
-                                     .keys = args.keys.given_directory()};
+                                     .keys = args.keys.given_directory(),
+                                     .exchange = args.exchange};
     if (args.name.empty() && options.keys.empty()) {
         throw usage_error("which vehicle is it? Give --name, or --keys with the key of a member of a fleet");
     }
-    options.setup.name = args.name.empty() ? tool::name_of_member(options.keys) : args.name;
-    options.setup.ahead = args.ahead;
-    options.setup.start = {args.x, options.setup.plan.speed, 0};
-    options.setup.limits.lag = args.lag;
-    options.setup.limits.brake = args.brake;
+    auto& driving = options.setup.driving;
+    driving.name = args.name.empty() ? tool::name_of_member(options.keys) : args.name;
+    driving.ahead = args.ahead;
+    driving.start = {args.x, driving.plan.speed, 0};
+    driving.limits.lag = args.lag;
+    driving.limits.brake = args.brake;
     if (options.start_ns == 0) {
         options.start_ns = platoon::monotonic_ns();
     }
-    if (options.start_utc == 0) {
-        options.start_utc = platoon::utc_at(options.start_ns);
+    if (options.setup.start_utc == 0) {
+        options.setup.start_utc = platoon::utc_at(options.start_ns);
     }
     const auto report = platoon::vehicle_node{std::move(options)}.run();
     if (args.report) {
@@ -208,19 +213,20 @@ int vehicle(const arguments& args) {
     return 0;
 }
 
+int relay(const arguments& args) {
+    platoon::run_relay({.devices = args.devices,
+                        .listen = args.listen,
+                        .losses = args.losses(),
+                        .delay = args.delay_ms / 1000,
+                        .seed = args.seed});
+    return 0;
+}
+
 void add_common(CLI::App& command, arguments& args) {
     command.add_option("--hz", args.hz, "Updates of each vehicle per second (25)")->check(CLI::Range(10.0, 50.0));
     command.add_option("--seconds", args.seconds, "Duration (default: until the leader's manoeuvre ends)")
         ->check(CLI::Range(1.0, 600.0));
-    command.add_option("--loss", args.loss_percent, "Updates that each receiver loses, in percent (0)")
-        ->check(CLI::Range(0.0, 100.0));
-    command
-        .add_option("--burst", args.burst,
-                    "Updates are lost in bursts, with this mean number of updates (independently)")
-        ->check(CLI::Range(0.0, 1000.0));
     command.add_flag("--no-radar", args.no_radar, "Vehicles have no radar: without updates they see nothing");
-    command.add_option("--delay", args.delay_ms, "Delay of updates in ms: at least half of it, at most all of it (0)")
-        ->check(CLI::Range(0.0, 1000.0));
     command.add_option("--brake-at", args.plan.brake_at, "The leader brakes at T (5)")
         ->check(CLI::Range(0.0, 3600.0))
         ->type_name("T");
@@ -230,6 +236,17 @@ void add_common(CLI::App& command, arguments& args) {
         ->check(CLI::Range(0.0, 600.0));
     command.add_option("--controller", args.controller, "Follow the leader too, or only the predecessor")
         ->check(CLI::IsMember({"leader", "predecessor"}));
+}
+
+void add_faults(CLI::App& command, arguments& args) {
+    command.add_option("--loss", args.loss_percent, "Updates that each receiver loses, in percent (0)")
+        ->check(CLI::Range(0.0, 100.0));
+    command
+        .add_option("--burst", args.burst,
+                    "Updates are lost in bursts, with this mean number of updates (independently)")
+        ->check(CLI::Range(0.0, 1000.0));
+    command.add_option("--delay", args.delay_ms, "Delay of updates in ms: at least half of it, at most all of it (0)")
+        ->check(CLI::Range(0.0, 1000.0));
 }
 
 void add_differences(CLI::App& command, arguments& args) {
@@ -272,6 +289,9 @@ int dispatch(const CLI::App& app, const arguments& args) {
     if (app.got_subcommand("tune")) {
         return tune_command(scenario_of(args), args.seeds);
     }
+    if (app.got_subcommand("relay")) {
+        return relay(args);
+    }
     return app.got_subcommand("run") ? run(args) : vehicle(args);
 }
 
@@ -285,16 +305,24 @@ int main(int argc, char** argv) {
     app.footer(
         "Exit codes: 0 ok, 1 a collision, or a platoon that stood still or fell apart, 2 usage, 3 no vehicle or no "
         "multicast, 4 the manoeuvre did not end, 5 another error, 6 busy.");
-    auto& in_time = *app.add_subcommand("simulate", "Simulate a drive in virtual time, without a network");
-    auto& search = *app.add_subcommand("tune", "Search the gains of the controller, in virtual time");
+    auto& in_time =
+        *app.add_subcommand("simulate", "Simulate the control law alone in virtual time: no nodes, no network");
+    auto& search = *app.add_subcommand("tune", "Search the gains of the control law, in virtual time");
     auto& on_road = *app.add_subcommand("run", "Run a drive, with a process for each vehicle");
     auto& one = *app.add_subcommand("vehicle", "Run one vehicle: lead, follow, or join a platoon");
+    auto& between = *app.add_subcommand("relay", "Carry packets between the networks of vehicles")->group("");
     for (auto* command : {&in_time, &search, &on_road, &one}) {
         add_common(*command, args);
     }
     for (auto* command : {&in_time, &search, &on_road}) {
         add_differences(*command, args);
     }
+    for (auto* command : {&in_time, &search, &on_road, &between}) {
+        add_faults(*command, args);
+    }
+    between.add_option("--devices", args.devices, "The descriptor of each device")->delimiter(',');
+    between.add_option("--listen", args.listen, "The URL at which it is asked");
+    between.add_option("--seed", args.seed, "Seed of the losses (1)");
     for (auto* command : {&in_time, &search}) {
         add_seeds(*command, args);
     }
@@ -331,7 +359,8 @@ int main(int argc, char** argv) {
     one.add_option("--start-ns", args.start_ns, "The start, by CLOCK_MONOTONIC (default: now)");
     one.add_option("--start-utc", args.start_utc,
                    "The same in UTC, seconds since 1970 (default: by this host's clock)");
-    one.add_option("--seed", args.seed, "Seed of the losses (1)");
+    one.add_option("--seed", args.seed, "Seed of its radar's errors (1)");
+    one.add_option("--exchange", args.exchange, "The folder of sockets for true positions")->group("");
     one.add_flag("--report", args.report, "Print the report of its recorder at the end");
     try {
         app.parse(argc, argv);

@@ -2,6 +2,7 @@
 #include <cles/convert.hpp>
 
 #include "platoon/drive/recording.hpp"
+#include "platoon/simulation/outcome.hpp"
 
 #include <boost/test/unit_test.hpp>
 

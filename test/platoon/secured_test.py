@@ -120,6 +120,11 @@ class Drive(Secured):
         self.assertIsNotNone(self.speed(found, "v3"))
         self.assertNotIn("gone", self.modes(found, "v3"))
 
+    def test_with_faults(self):
+        found = self.drive("--vehicles", 3, "--hz", 50, "--seconds", 4, "--loss", 10, "--leave", "1@1", "--secured")
+        self.assertIn("left", self.modes(found, "v1"))
+        self.assertGreater(found["missed"], 0)
+
     def test_a_vehicle_vanishes(self):
         found = self.drive("--vehicles", 3, "--seconds", 6, "--vanish", "1@2", "--secured")
         self.assertIn("killed", self.modes(found, "v1"))

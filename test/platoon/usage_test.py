@@ -8,10 +8,11 @@ import pty
 import re
 import select
 import socket
+import subprocess
 import time
 import unittest
 
-from processes import PATIENCE, free_group, run, start, wait_until
+from processes import PATIENCE, PLATOON, free_group, run, start, wait_until
 
 
 class Usage(unittest.TestCase):
@@ -40,6 +41,18 @@ class Usage(unittest.TestCase):
             self.assertNotIn(code, (0, 1), where)
             self.assertEqual(out, "")
             self.assertRegex(err, f"^cles-platoon: .*{re.escape(said)}")
+
+    def test_there_can_be_no_namespaces(self):
+        """Faults need one for each vehicle; without faults, nothing does."""
+        limited = ["unshare", "--user", "--map-root-user", "sh", "-c",
+                   'echo 0 >/proc/sys/user/max_net_namespaces && exec "$0" "$@"', PLATOON]
+        for more, code, said in ((["--loss", "10"], 3, "cles-platoon: faults need a network namespace for each vehicle, and this "
+                                                       "process may not create it: No space left on device\n"), ([], 4, "")):
+            done = subprocess.run([*limited, "run", "--vehicles", "2", "--seconds", "1", "--multicast", free_group(), *more],
+                                  stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE, check=False)
+            if "max_net_namespaces" in done.stderr or done.stderr.startswith("unshare: "):
+                self.skipTest("this system permits no user namespaces")
+            self.assertEqual((done.returncode, done.stderr), (code, said))
 
     def test_another_platoon_is_there(self):
         group = free_group()

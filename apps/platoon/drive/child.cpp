@@ -8,6 +8,7 @@
 #include <utility>
 
 #include <fcntl.h>
+#include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
@@ -18,18 +19,33 @@ namespace {
 
 [[noreturn]] void fail(const char* what) { throw std::system_error(errno, std::generic_category(), what); }
 
+/// What a child has from its parent.
+struct surroundings {
+    int out = -1, err = -1;
+    int network = -1; ///< -1: the parent's
+    const std::vector<int>& inherited;
+    pid_t parent = -1;
+    const sigset_t& unblocked;
+};
+
 // Between fork and exec: nothing but system calls.
-[[noreturn]] void exec_child(std::vector<char*>& words, int out, int err, pid_t parent, const sigset_t& unblocked) {
+[[noreturn]] void exec_child(std::vector<char*>& words, const surroundings& in) {
     ::signal(SIGTERM, SIG_DFL);
-    ::pthread_sigmask(SIG_SETMASK, &unblocked, nullptr);
+    ::pthread_sigmask(SIG_SETMASK, &in.unblocked, nullptr);
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-    if (::getppid() != parent) {
+    if (::getppid() != in.parent) {
         ::_exit(127); // the parent has ended meanwhile
+    }
+    if (in.network >= 0 && ::setns(in.network, CLONE_NEWNET) != 0) {
+        ::_exit(127);
+    }
+    for (const int each : in.inherited) {
+        ::fcntl(each, F_SETFD, 0);
     }
     const int nothing = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
     ::dup2(nothing, STDIN_FILENO);
-    ::dup2(out, STDOUT_FILENO);
-    ::dup2(err, STDERR_FILENO);
+    ::dup2(in.out, STDOUT_FILENO);
+    ::dup2(in.err, STDERR_FILENO);
     ::setpgid(0, 0); // a terminal sends SIGINT to the whole group, but the parent stops its children itself
     ::execv("/proc/self/exe", words.data());
     ::_exit(127);
@@ -37,7 +53,7 @@ namespace {
 
 } // namespace
 
-child::child(const std::vector<std::string>& arguments) {
+child::child(const std::vector<std::string>& arguments, int network, const std::vector<int>& inherited) {
     out_ = ::memfd_create("output", MFD_CLOEXEC);
     err_ = ::memfd_create("errors", MFD_CLOEXEC);
     if (out_ < 0 || err_ < 0) {
@@ -60,7 +76,12 @@ child::child(const std::vector<std::string>& arguments) {
     ::pthread_sigmask(SIG_BLOCK, &terminate, &unblocked);
     pid_ = ::fork();
     if (pid_ == 0) {
-        exec_child(words, out_, err_, parent, unblocked);
+        exec_child(words, {.out = out_,
+                           .err = err_,
+                           .network = network,
+                           .inherited = inherited,
+                           .parent = parent,
+                           .unblocked = unblocked});
     }
     ::pthread_sigmask(SIG_SETMASK, &unblocked, nullptr);
     if (pid_ < 0) {

@@ -11,8 +11,10 @@ namespace platoon {
 /// A child process that runs this program, with its output in unnamed files. It ends when its parent ends.
 class child {
   public:
+    /// \param network the descriptor of the network namespace in which it runs; -1: in this one
+    /// \param inherited descriptors that it gets, with the same numbers
     /// \throws std::system_error if it cannot be started
-    explicit child(const std::vector<std::string>& arguments);
+    explicit child(const std::vector<std::string>& arguments, int network = -1, const std::vector<int>& inherited = {});
     child(child&& other) noexcept;
     child& operator=(child&&) = delete;
     child(const child&) = delete;

@@ -7,6 +7,9 @@
 #include "platoon/drive/child.hpp"
 #include "platoon/drive/course.hpp"
 #include "platoon/drive/laboratory_fleet.hpp"
+#include "platoon/drive/relay.hpp"
+#include "platoon/drive/temporary_folder.hpp"
+#include "platoon/drive/vehicle_networks.hpp"
 #include "platoon/drive/vehicle_node.hpp"
 #include "platoon/drive/view.hpp"
 #include "platoon/driver/localization.hpp"
@@ -17,11 +20,13 @@
 #include <boost/asio/use_awaitable.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -71,6 +76,35 @@ void check_keys(const drive_options& options, const std::string& fleet) {
     }
 }
 
+bool has_faults(const drive_options& options) { return options.loss > 0 || options.delay > 0; }
+
+/// What a drive with faults consists of, besides the vehicles.
+struct faulty_network {
+    explicit faulty_network(const drive_options& options) : networks(all_vehicles(options)) {
+        const auto devices = networks.devices();
+        std::string numbers;
+        for (const int each : devices) {
+            numbers.append(numbers.empty() ? "" : ",").append(std::to_string(each));
+        }
+        const auto text = [](double value) {
+            std::array<char, 32> out{};
+            std::snprintf(out.data(), out.size(), "%.17g", value);
+            return std::string{out.data()};
+        };
+        relay.emplace(std::vector<std::string>{"relay", "--devices", numbers, "--listen", relay_url(), "--loss",
+                                               text(options.loss * 100), "--burst", text(options.burst), "--delay",
+                                               text(options.delay * 1000), "--seed", std::to_string(options.seed)},
+                      -1, devices);
+    }
+
+    [[nodiscard]] std::string relay_url() const { return exchange_url(sockets.path(), relay_name); }
+    [[nodiscard]] std::string url_of(const std::string& vehicle) const { return exchange_url(sockets.path(), vehicle); }
+
+    vehicle_networks networks;
+    temporary_folder sockets; ///< links without faults
+    std::optional<child> relay;
+};
+
 cles::service_options options_of(const drive_options& options, const std::string& fleet) {
     std::string keys;
     if (!fleet.empty()) {
@@ -79,7 +113,7 @@ cles::service_options options_of(const drive_options& options, const std::string
     }
     auto out = tool::options_of_member("platoon-" + std::to_string(::getpid()), keys);
     out.insecure = options.insecure;
-    out.multicast = options.group;
+    out.multicast = has_faults(options) ? cles::multicast_options{} : options.group;
     return out;
 }
 
@@ -87,6 +121,7 @@ class drive_supervisor {
   public:
     explicit drive_supervisor(const drive_options& options)
         : options_(options), signals_(io_, SIGINT, SIGTERM),
+          faults_(has_faults(options) ? std::make_unique<faulty_network>(options) : nullptr),
           laboratory_(options.secured ? std::make_unique<laboratory_fleet>(all_vehicles(options)) : nullptr),
           keys_(laboratory_ ? laboratory_->folder() : options.keys),
           limits_(limits_of(all_vehicles(options), options.differences, options.setup.limits, options.seed)),
@@ -121,18 +156,45 @@ class drive_supervisor {
         for (;;) {
             const auto item = co_await feed.async_next();
             if (item.has_value()) {
-                const auto told = to_state(item.value, start_utc_);
-                if (implausible(told, options_.setup.law).empty()) {
-                    book_.add(item.publisher, told);
-                }
+                take(item.publisher, item.value);
                 foreign_vehicle_ = children_.contains(item.publisher) ? foreign_vehicle_ : item.publisher;
             }
         }
     }
 
+    void take(const std::string& from, const localization& what) {
+        const auto told = to_state(what, start_utc_);
+        if (implausible(told, options_.setup.law).empty()) {
+            book_.add(from, told);
+        }
+    }
+
+    // By its link without faults, as soon as it listens.
+    asio::awaitable<void> hear_behind_relay(std::string name) {
+        for (;;) {
+            try {
+                auto feed = co_await service_.async_bind<localization>(
+                    name + ":state", cles::bind_options{}.at(faults_->url_of(name), name));
+                for (;;) {
+                    const auto item = co_await feed.async_next();
+                    if (item.has_value()) {
+                        take(name, item.value);
+                    }
+                }
+            } catch (const cles::error& e) {
+                if (e.code() != cles::errc::unavailable) {
+                    throw;
+                }
+            }
+            co_await pause(poll_interval);
+        }
+    }
+
     asio::awaitable<void> supervise() {
-        asio::co_spawn(io_, hear(), [this](const std::exception_ptr& why) { receive_failure_ = why; });
-        co_await pause(discovery_time);
+        if (!faults_) {
+            asio::co_spawn(io_, hear(), [this](const std::exception_ptr& why) { receive_failure_ = why; });
+            co_await pause(discovery_time);
+        }
         if (!foreign_vehicle_.empty()) {
             throw cles::error(cles::errc::busy, "another platoon uses this group (received " + foreign_vehicle_ +
                                                     "): choose another port with --multicast");
@@ -170,6 +232,10 @@ class drive_supervisor {
             }
         }
         end_ = std::min(end_, now()) - 2 / options_.setup.hz;
+        if (faults_) {
+            relayed_ =
+                co_await service_.async_pull<relay_count>("self:links", cles::call_options{}.at(faults_->relay_url()));
+        }
         co_await end_all();
     }
 
@@ -223,23 +289,28 @@ class drive_supervisor {
         add("--brake-at", setup.plan.brake_at);
         add("--slow", setup.plan.slow);
         add("--slow-for", setup.plan.slow_for);
-        add("--loss", options_.loss * 100);
-        add("--burst", options_.burst);
-        add("--delay", options_.delay * 1000);
         add("--seed", options_.seed * 1000 + i);
         words.insert(words.end(), {"--controller", setup.uses_leader ? "leader" : "predecessor"});
-        words.insert(words.end(), {"--multicast", options_.group.interface + "," + options_.group.group + ":" +
-                                                      std::to_string(options_.group.port)});
+        words.insert(words.end(),
+                     {"--multicast", (faults_ ? radio_device : options_.group.interface) + "," + options_.group.group +
+                                         ":" + std::to_string(options_.group.port)});
         if (!setup.radar.fitted) {
             words.emplace_back("--no-radar");
         }
-        if (options_.insecure) {
+        if (faults_) {
+            words.insert(words.end(), {"--exchange", faults_->sockets.path()});
+        }
+        if (options_.insecure || (faults_ && keys_.empty())) { // nobody else is in that network
             words.emplace_back("--insecure");
         }
         if (!keys_.empty()) {
             words.insert(words.end(), {"--keys", keys_of(name_of(i), keys_)});
         }
-        children_.try_emplace(name_of(i), words);
+        children_.try_emplace(name_of(i), words, faults_ ? faults_->networks.network_of(i) : -1);
+        if (faults_) {
+            asio::co_spawn(io_, hear_behind_relay(name_of(i)),
+                           [this](const std::exception_ptr& why) { receive_failure_ = why ? why : receive_failure_; });
+        }
     }
 
     void apply_incidents() {
@@ -265,7 +336,8 @@ class drive_supervisor {
     }
 
     void ask(const std::string& name, const std::string& task) {
-        service_.async_push(name + ":" + task, cles::json_text{"{}"},
+        const auto how = faults_ ? cles::call_options{}.at(faults_->url_of(name), name) : cles::call_options{};
+        service_.async_push(name + ":" + task, cles::json_text{"{}"}, how,
                             [this, name, task](boost::system::error_code failed, const cles::json_text&) {
                                 if (failed) {
                                     note(name, "stays", "the request to " + task + " failed: " + failed.message());
@@ -274,6 +346,10 @@ class drive_supervisor {
     }
 
     void check_children() {
+        if (faults_ && !faults_->relay->running()) {
+            auto said = faults_->relay->errors();
+            throw cles::error(cles::errc::unavailable, "the relay has ended: " + said.substr(0, said.find('\n')));
+        }
         for (auto& [name, process] : children_) {
             if (process.running() || book_.has_ended(name)) {
                 continue;
@@ -349,7 +425,6 @@ class drive_supervisor {
             }
             out.sent += report.sent;
             out.received += report.received;
-            out.lost += report.lost;
             out.missed += report.missed;
             out.events.insert(out.events.end(), report.events.begin(), report.events.end());
             latencies.insert(latencies.end(), report.latency_us.begin(), report.latency_us.end());
@@ -359,6 +434,8 @@ class drive_supervisor {
             return static_cast<std::uint64_t>(std::count_if(out.events.begin(), out.events.end(),
                                                             [&mode](const event& e) { return e.mode == mode; }));
         };
+        out.relayed = relayed_.delivered;
+        out.lost = relayed_.lost;
         out.fallbacks = count("fallback");
         out.radar_spells = count("radar");
         out.latency = summarise(std::move(latencies));
@@ -376,6 +453,7 @@ class drive_supervisor {
     const drive_options& options_;
     asio::io_context io_{1};
     asio::signal_set signals_;                     ///< before there are files that have to be removed in the end
+    std::unique_ptr<faulty_network> faults_;       ///< null: none
     std::unique_ptr<laboratory_fleet> laboratory_; ///< if it was asked for
     std::string keys_;                             ///< the folder of the fleet; empty: without security
     std::vector<vehicle_limits> limits_;           ///< of each vehicle
@@ -386,6 +464,7 @@ class drive_supervisor {
     std::map<std::string, child> children_;
     std::vector<std::string> first_; ///< the vehicles at the start, the leader first
     std::vector<event> events_;
+    relay_count relayed_;
     std::string foreign_vehicle_;
     std::exception_ptr receive_failure_; ///< why updates are no longer received
     std::int64_t start_ns_ = 0;

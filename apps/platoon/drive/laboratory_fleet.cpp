@@ -10,10 +10,7 @@
 
 #include "platoon/simulation/simulation.hpp"
 
-#include <cerrno>
-#include <cstdlib>
-#include <filesystem>
-#include <system_error>
+#include <string>
 #include <vector>
 
 namespace platoon {
@@ -28,19 +25,6 @@ const security::member_rights of_vehicle{
     .offers = rights{"bind *:cles", "bind *:state", "push *:join", "push *:leave", "push *:split"}};
 const security::member_rights of_operator{.may = rights{"bind *:cles", "bind *:state", "push *:leave", "push *:split"},
                                           .offers = rights{}};
-
-std::string temporary_folder() {
-    auto path = (std::filesystem::temp_directory_path() / "cles-platoon-XXXXXX").string();
-    if (::mkdtemp(path.data()) == nullptr) { // with the mode 0700
-        throw std::system_error(errno, std::generic_category(), "a folder for keys, " + path);
-    }
-    return path;
-}
-
-void remove(const std::string& folder) {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder, ignored);
-}
 
 void create_members(const std::string& folder, std::size_t vehicles) {
     const auto directory_of = [&folder](const std::string& name) { return security::member_folder(folder, name); };
@@ -62,17 +46,10 @@ void create_members(const std::string& folder, std::size_t vehicles) {
 
 } // namespace
 
-laboratory_fleet::laboratory_fleet(std::size_t vehicles) : folder_(temporary_folder()) {
-    try {
-        security::forbid_core_dumps();
-        create_members(folder_, vehicles);
-    } catch (...) {
-        remove(folder_);
-        throw;
-    }
+laboratory_fleet::laboratory_fleet(std::size_t vehicles) {
+    security::forbid_core_dumps();
+    create_members(folder(), vehicles);
 }
-
-laboratory_fleet::~laboratory_fleet() { remove(folder_); }
 
 } // namespace platoon
 
@@ -85,8 +62,6 @@ namespace platoon {
 laboratory_fleet::laboratory_fleet(std::size_t /*vehicles*/) {
     throw tool::usage_error("--secured: this program was built without security");
 }
-
-laboratory_fleet::~laboratory_fleet() = default;
 
 } // namespace platoon
 

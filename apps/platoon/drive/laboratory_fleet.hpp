@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "platoon/drive/temporary_folder.hpp"
+
 #include <cstddef>
 #include <string>
 
@@ -16,15 +18,11 @@ class laboratory_fleet {
   public:
     /// \throws tool::usage_error if this program was built without security
     explicit laboratory_fleet(std::size_t vehicles);
-    laboratory_fleet(const laboratory_fleet&) = delete;
-    laboratory_fleet& operator=(const laboratory_fleet&) = delete;
-    /// Removes all of it.
-    ~laboratory_fleet();
 
-    [[nodiscard]] const std::string& folder() const noexcept { return folder_; }
+    [[nodiscard]] const std::string& folder() const noexcept { return folder_.path(); }
 
   private:
-    std::string folder_;
+    temporary_folder folder_; ///< removed with all of it
 };
 
 } // namespace platoon

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "platoon/drive/logbook.hpp"
 
-#include "platoon/simulation/simulation.hpp"
-
 #include <algorithm>
 
 namespace platoon {

@@ -5,13 +5,13 @@
 #include <cles/error.hpp>
 
 #include "platoon/driver/localization.hpp"
+#include "platoon/simulation/outcome.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
-#include <utility>
 
 namespace platoon {
 namespace {
@@ -54,33 +54,6 @@ latency_summary summarise(std::vector<double> latencies_us) {
         out.curve.push_back(at(i * 0.001));
     }
     return out;
-}
-
-bool is_failure(const verdict& result, bool steady) {
-    const bool judged = result.ended || !steady;
-    return (judged && result.string_ratio > stable_ratio) || (steady && (result.stands || result.apart));
-}
-
-int exit_code_of(const verdict& result, bool steady) {
-    if (result.collision || (steady && (result.stands || result.apart))) {
-        return 1;
-    }
-    return steady && !result.ended ? 4 : 0;
-}
-
-std::string gains_line(const char* heading, const amplification& gains_of_each) {
-    std::string text;
-    for (const auto& [what, each] :
-         {std::pair{"errors", &gains_of_each.error}, std::pair{"speeds", &gains_of_each.speed},
-          std::pair{"accelerations", &gains_of_each.acceleration}}) {
-        const double most = largest(*each);
-        if (!std::isnan(most)) {
-            std::array<char, 64> part{};
-            std::snprintf(part.data(), part.size(), "%s %s %.4f", text.empty() ? "" : ",", what, most);
-            text += part.data();
-        }
-    }
-    return text.empty() ? "" : std::string{heading} + text + " times those of the one ahead, at most\n";
 }
 
 std::string summary_of(const recording& drive) {
@@ -131,6 +104,13 @@ std::string summary_of(const recording& drive) {
                       std::uintmax_t{drive.radar_spells}));
     add(std::snprintf(line.data(), line.size(), "fallback  %ju times because updates were missing\n",
                       std::uintmax_t{drive.fallbacks}));
+    if (drive.relayed + drive.lost != 0) {
+        add(std::snprintf(line.data(), line.size(), "relay     %ju of %ju packets lost\n", std::uintmax_t{drive.lost},
+                          std::uintmax_t{drive.relayed + drive.lost}));
+        add(std::snprintf(line.data(), line.size(),
+                          "gaps      %ju updates missing of %ju, as the nodes of the vehicles reported\n",
+                          std::uintmax_t{drive.missed}, std::uintmax_t{drive.received + drive.missed}));
+    }
     if (drive.latency.count != 0) {
         const auto& l = drive.latency;
         add(std::snprintf(line.data(), line.size(),

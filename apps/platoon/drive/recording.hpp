@@ -2,6 +2,7 @@
 #pragma once
 
 #include "platoon/driver/motion.hpp"
+#include "platoon/driver/vehicle_report.hpp"
 #include "platoon/simulation/assessment.hpp"
 
 #include <boost/describe/class.hpp>
@@ -11,27 +12,6 @@
 #include <vector>
 
 namespace platoon {
-
-/// A vehicle changed its mode.
-struct event {
-    double t = 0;
-    std::string vehicle{};
-    std::string mode{};
-    std::string why{};
-};
-BOOST_DESCRIBE_STRUCT(event, (), (t, vehicle, mode, why))
-
-/// What the recorder of a vehicle contains at the end of its drive.
-struct vehicle_report {
-    std::string vehicle{};
-    std::uint64_t sent = 0;
-    std::uint64_t received = 0;       ///< of vehicles it was bound to, including those lost on purpose
-    std::uint64_t lost = 0;           ///< on purpose
-    std::uint64_t missed = 0;         ///< that never arrived
-    std::vector<double> latency_us{}; ///< from sending to reading, without delays on purpose
-    std::vector<event> events{};
-};
-BOOST_DESCRIBE_STRUCT(vehicle_report, (), (vehicle, sent, received, lost, missed, latency_us, events))
 
 /// One vehicle over the time of a drive; null (NaN) while it is not on the lane.
 struct course {
@@ -66,9 +46,11 @@ struct recording {
     bool steady =
         true; ///< no vehicle joined, left or vanished, so that `verdict.error` and `string_ratio` are meaningful
     struct verdict verdict {};
-    std::uint64_t fallbacks = 0;    ///< how often a vehicle fell back because updates were missing
-    std::uint64_t radar_spells = 0; ///< how often one followed by its radar alone because updates were missing
-    std::uint64_t sent = 0, received = 0, lost = 0, missed = 0;
+    std::uint64_t fallbacks = 0;          ///< how often a vehicle fell back because updates were missing
+    std::uint64_t radar_spells = 0;       ///< how often one followed by its radar alone because updates were missing
+    std::uint64_t sent = 0, received = 0; ///< updates, by vehicles that were bound
+    std::uint64_t missed = 0;             ///< updates that nodes reported as gaps
+    std::uint64_t relayed = 0, lost = 0;  ///< packets that the relay delivered, and that it lost
     latency_summary latency{};
     std::vector<event> events{};
     std::vector<double> t{};
@@ -76,15 +58,8 @@ struct recording {
 };
 BOOST_DESCRIBE_STRUCT(recording, (),
                       (source, vehicles, hz, loss, burst, delay_ms, spacing, seed, steady, verdict, fallbacks,
-                       radar_spells, sent, received, lost, missed, latency, events, t, courses))
+                       radar_spells, sent, received, missed, relayed, lost, latency, events, t, courses))
 
-/// Whether string stability was lost: errors grew, or, while the platoon stayed the same, vehicles stand or are apart.
-bool is_failure(const verdict& result, bool steady);
-/// The exit code of a drive: 1 for a collision, and if vehicles stand or are apart although nothing was planned to
-/// happen to them; 4 if the manoeuvre did not end, so that there is no verdict; otherwise 0.
-int exit_code_of(const verdict& result, bool steady);
-/// What gains there are, in one line; empty: there are none.
-std::string gains_line(const char* heading, const amplification& gains_of_each);
 /// A few lines of text.
 std::string summary_of(const recording& drive);
 /// Checks that a file can be opened for writing; it is created if it does not exist, and not changed otherwise.

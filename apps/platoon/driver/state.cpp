@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "platoon/driver/state.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace platoon {
@@ -10,8 +11,13 @@ constexpr double fastest_change = 1000; // m/s³, of the command
 constexpr double longest_lag = 5;       // s
 constexpr double farthest = 1e7;        // m
 constexpr double latest = 1e11;         // s
+constexpr double fail_safe = -3;        // m/s²
 
 } // namespace
+
+motion without_driver(const state& last, double t) {
+    return advance(last.position(), std::min(last.u, fail_safe), last.lag, t - last.t);
+}
 
 std::string implausible(const state& told, const gains& law) {
     struct limited {

@@ -50,6 +50,10 @@ struct state {
 /// No vehicle on a road exceeds these, m/s and m/s².
 inline constexpr double most_speed = 100, most_acceleration = 20;
 
+/// The motion at `t` of a vehicle that has had no driver since this state: it keeps braking, and starts to brake if it
+/// did not.
+motion without_driver(const state& last, double t);
+
 /// Why no vehicle can be in this state, so that its update has to be dropped; empty: it can. It may come from anybody.
 std::string implausible(const state& told, const gains& law);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "platoon/simulation/simulation.hpp"
 
+#include "platoon/simulation/link_matrix.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -8,16 +10,6 @@
 #include <queue>
 
 namespace platoon {
-
-unsigned decisions_per_update(double hz) { return static_cast<unsigned>(std::ceil(100 / hz)); }
-
-unsigned decisions_per_echo(const radar_setup& radar, double hz) {
-    return std::max(1U, static_cast<unsigned>(std::lround(radar.period * hz * decisions_per_update(hz))));
-}
-
-double send_offset(std::size_t i, std::size_t n, double hz) {
-    return static_cast<double>(i) / static_cast<double>(n) / hz;
-}
 
 std::string name_of(std::size_t i) { return "v" + std::to_string(i); }
 
@@ -45,11 +37,6 @@ std::vector<motion> start_positions(const std::vector<vehicle_limits>& vehicles,
     return all;
 }
 
-motion without_driver(const state& last, double t) {
-    constexpr double fail_safe = -3; // m/s²
-    return advance(last.position(), std::min(last.u, fail_safe), last.lag, t - last.t);
-}
-
 namespace {
 
 constexpr double leave_duration = 1; // s in which a vehicle announces that it leaves
@@ -66,7 +53,7 @@ struct scheduled_event {
     }
 };
 
-/// A vehicle with its driver, its radio links and its radar.
+/// A vehicle with its driver and its radar.
 struct simulated_vehicle {
     std::string name;
     driver who;
@@ -74,14 +61,13 @@ struct simulated_vehicle {
     double first = 0; ///< when it sends first
     double mute_until = -INFINITY;
     bool vanished = false, left = false;
-    std::vector<std::optional<impairment>> links{}; ///< from each of the others
 };
 
 class simulated_platoon {
   public:
     explicit simulated_platoon(const scenario& what)
         : what_(what), period_(1 / what.setup.hz), decisions_(decisions_per_update(what.setup.hz)),
-          echoes_(decisions_per_echo(what.setup.radar, what.setup.hz)),
+          echoes_(decisions_per_echo(what.setup.radar, what.setup.hz)), links_(what.losses, what.delay, what.seed),
           result_(what.vehicles, what.setup.spacing, what.setup.limits.length) {
         const auto limits = limits_of(what.vehicles, what.differences, what.setup.limits, what.seed);
         const auto starts = start_positions(limits, what.setup.spacing, what.setup.plan.speed);
@@ -225,21 +211,10 @@ class simulated_platoon {
             if (!all_[i].who.needs(all_[from].name)) {
                 continue;
             }
-            if (const auto later = link(from, i).next()) {
+            if (const auto later = links_.next(from, i)) {
                 schedule_.push({now + *later, scheduled_event::delivery, i, from, 0, said});
             }
         }
-    }
-
-    impairment& link(std::size_t from, std::size_t to) {
-        auto& links = all_[to].links;
-        if (links.size() <= from) {
-            links.resize(from + 1);
-        }
-        if (!links[from]) {
-            links[from].emplace(what_.losses, what_.delay, what_.seed * 1'000'000 + to * 1000 + from);
-        }
-        return *links[from];
     }
 
     template <class Watch>
@@ -275,6 +250,7 @@ class simulated_platoon {
     scenario what_;
     double period_;
     unsigned decisions_, echoes_;
+    link_matrix links_;
     assessment result_;
     std::vector<simulated_vehicle> all_;
     std::vector<std::size_t> lane_; ///< from the front to the rear

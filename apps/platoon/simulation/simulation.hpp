@@ -2,6 +2,7 @@
 #pragma once
 
 #include "platoon/driver/driver.hpp"
+#include "platoon/driver/pace.hpp"
 #include "platoon/simulation/assessment.hpp"
 #include "platoon/simulation/impairment.hpp"
 #include "platoon/simulation/incident.hpp"
@@ -12,12 +13,6 @@
 
 namespace platoon {
 
-/// How often a vehicle decides between two of its updates, so that it does so at least 100 times a second.
-unsigned decisions_per_update(double hz);
-/// After how many decisions the radar measures.
-unsigned decisions_per_echo(const radar_setup& radar, double hz);
-/// The offset in a period at which vehicle i of n sends, so that not all send at once.
-double send_offset(std::size_t i, std::size_t n, double hz);
 /// Vehicle i's name.
 std::string name_of(std::size_t i);
 /// The losses on a link. \param loss the share \param burst the mean number of updates of a burst; 0: independent
@@ -54,10 +49,6 @@ struct sighting {
     double distance = 0; ///< to the one ahead in the lane; NaN: there is none
     bool in_lane = true;
 };
-
-/// The motion at `t` of a vehicle that has had no driver since this state: it keeps braking, and starts to brake if it
-/// did not.
-motion without_driver(const state& last, double t);
 
 /// A platoon in virtual time. \param watch is called a hundred times per second with all vehicles; those that join are
 /// added at the end
