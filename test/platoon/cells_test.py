@@ -3,7 +3,7 @@
 """However many updates are lost, vehicles with a radar do not collide: a fixed part of the drives of
 perf/evaluation/platoon_cells.py, at each rate with each loss; and the gains of perf/evaluation/platoon_gains.py.
 
-    cells_test.py SCRIPTS PROGRAMS
+    cells_test.py SCRIPTS PROGRAMS SIMULATION
 """
 
 import json
@@ -13,7 +13,7 @@ import tempfile
 import unittest
 from pathlib import Path
 
-SCRIPTS, PROGRAMS = Path(sys.argv[1]), sys.argv[2]
+SCRIPTS, PROGRAMS, SIMULATION = Path(sys.argv[1]), sys.argv[2], sys.argv[3]
 
 
 def run(script, *arguments):
@@ -40,6 +40,13 @@ class Cells(unittest.TestCase):
         for cell in without:  # the gap does not open
             self.assertGreater(cell["least_gap"], 9, cell)
             self.assertLess(cell["string_ratio"], 1.02, cell)
+
+    def test_the_failures_on_nodes(self):
+        code, found, said = run("platoon_cells.py", "--failures", "--nodes", "--simulation", SIMULATION, "--seeds", 1, "--vehicles", 2,
+                                "--seconds", 2, "--hz", 10)
+        self.assertEqual(code, 0, said)
+        self.assertEqual([(cell["hz"], cell["collisions"]) for cell in found["failures"]], [(10, 0)] * 4)
+        self.assertRegex(said, r"(?m)^\| 10 % in bursts of 3; no radar \| 0\.0 % \(0\.0 to \d+\.\d\), \d\.\d\d, \d+\.\d m \|$")
 
     def test_the_gains_of_each_vehicle(self):
         code, found, said = run("platoon_gains.py", "--quick")

@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
-// Simulates seeds, or plans that are read from files, and reports violations; or measures gossip among many nodes
-// (README.md of the folder above).
+// Simulates seeds, or plans that are read from files, and reports violations; measures gossip among many nodes; or
+// drives a platoon (README.md of the folder above).
 #include "simulation/gossip_network.hpp"
 #include "simulation/mesh.hpp"
 #include "simulation/sharing.hpp"
 #include "simulation/world/simulate.hpp"
+#if CLES_SIMULATION_PLATOON
+#include <cles/convert.hpp>
+
+#include "simulation/platoon.hpp"
+#endif
 
 #include <boost/describe/enum_from_string.hpp>
 
@@ -16,6 +21,7 @@
 #include <exception>
 #include <iomanip>
 #include <iostream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -210,6 +216,86 @@ int measure_gossip(const gossip_options& o) {
     return breaches == 0 ? 0 : 1;
 }
 
+// -- platoon -------------------------------------------------------------------------------------------------------
+
+#if CLES_SIMULATION_PLATOON
+struct platoon_options {
+    seed_range seeds{};
+    double loss_percent = 0, burst = 0, delay_ms = 0;
+    std::vector<double> lags{}, brakes{};
+    bool json = false, no_radar = false;
+    platoon::scenario what{};
+};
+
+int drive_platoon(const platoon_options& o) {
+    auto what = o.what;
+    const double loss = o.loss_percent / 100;
+    if (o.burst > 0 && (loss >= 1 || o.burst < platoon::gilbert_elliott::shortest(loss))) {
+        throw std::runtime_error{"--burst: at this loss, bursts have at least loss / (1 - loss) updates on average"};
+    }
+    what.losses = platoon::losses_of(loss, o.burst);
+    what.delay = o.delay_ms / 1000;
+    what.setup.radar.fitted = !o.no_radar;
+    what.setup.law = platoon::gains_for(what.setup.hz);
+    if (!o.lags.empty()) {
+        what.differences.least_lag = o.lags.front();
+        what.differences.most_lag = o.lags.back();
+    }
+    if (!o.brakes.empty()) {
+        what.differences.least_brake = o.brakes.front();
+        what.differences.most_brake = o.brakes.back();
+    }
+    what.seed = o.seeds.first;
+    auto all = platoon::outcome_of(what);
+    std::uint64_t broken = 0;
+    std::uint64_t received = 0;
+    std::uint64_t missed = 0;
+    std::uint64_t copies = 0;
+    std::uint64_t lost = 0;
+    for (; what.seed < o.seeds.first + o.seeds.count; ++what.seed) {
+        const auto one = simulate_platoon(what);
+        broken += print("seed " + std::to_string(what.seed), one.violations) ? 0 : 1;
+        platoon::add(all, one.drive);
+        received += one.received;
+        missed += one.missed;
+        copies += one.copies;
+        lost += one.lost;
+        constexpr std::uint64_t most_lines = 20;
+        if (!o.json && o.seeds.count <= most_lines) {
+            std::fputs(platoon::line_of(what.seed, one.drive).c_str(), stdout);
+            std::fflush(stdout);
+        }
+    }
+    if (o.json) {
+        std::puts(cles::to_json(all).c_str());
+    } else {
+        std::fputs(platoon::summary_of(all).c_str(), stdout);
+        std::printf("network   %ju of %ju datagrams lost, counted for each receiver\n"
+                    "gaps      %ju updates missing of %ju, as the nodes reported\n",
+                    std::uintmax_t{lost}, std::uintmax_t{copies}, std::uintmax_t{missed},
+                    std::uintmax_t{received + missed});
+    }
+    return broken != 0 ? 2 : platoon::exit_code_of(all);
+}
+
+void add_platoon(CLI::App& to, platoon_options& o) {
+    to.add_option("--first-seed,--seed", o.seeds.first, "The first seed");
+    to.add_option("--seeds", o.seeds.count, "How many");
+    to.add_option("-n,--vehicles", o.what.vehicles, "How many")->check(CLI::Range(2, 100));
+    to.add_option("--hz", o.what.setup.hz, "Updates of each vehicle per second")->check(CLI::Range(10.0, 50.0));
+    to.add_option("--seconds", o.what.seconds, "Duration (0: until the leader's manoeuvre ends)");
+    to.add_option("--loss", o.loss_percent, "Datagrams that each receiver loses, in percent")
+        ->check(CLI::Range(0.0, 100.0));
+    to.add_option("--burst", o.burst, "They are lost in bursts, with this mean number (0: independently)");
+    to.add_option("--delay", o.delay_ms, "Their delay in ms: at least half of it, at most all of it");
+    to.add_option("--lags", o.lags, "Engines and brakes lag by LOW to HIGH seconds")->expected(2);
+    to.add_option("--brakes", o.brakes, "Vehicles brake with at most LOW to HIGH m/s²")->expected(2);
+    to.add_option("--brake-at", o.what.setup.plan.brake_at, "The leader brakes at this time, s");
+    to.add_flag("--no-radar", o.no_radar, "Vehicles have no radar");
+    to.add_flag("--json", o.json, "Print the results of all drives as JSON");
+}
+#endif
+
 // -- options -------------------------------------------------------------------------------------------------------
 
 void add_seeds(CLI::App& to, seed_range& seeds) {
@@ -282,6 +368,11 @@ int main(int argc, char** argv) {
     gossip->add_option("--seed", many.seed, "Of chance");
     gossip->add_option("--only", many.only, "This part alone")
         ->check(CLI::IsMember({"start", "short-cut", "long-cut", "weather"}));
+#if CLES_SIMULATION_PLATOON
+    auto* vehicles = program.add_subcommand("platoon", "Drives a platoon, each vehicle on a node");
+    platoon_options driven;
+    add_platoon(*vehicles, driven);
+#endif
     CLI11_PARSE(program, argc, argv);
     try {
         if (*gossip) {
@@ -294,6 +385,11 @@ int main(int argc, char** argv) {
             return run_seeds(sharing_seeds,
                              [&](std::uint64_t seed) { return simulate_sharing(seed, shared, given.fault); });
         }
+#if CLES_SIMULATION_PLATOON
+        if (*vehicles) {
+            return drive_platoon(driven);
+        }
+#endif
         return run(given);
     } catch (const std::exception& e) {
         std::cerr << "cles_simulation: " << e.what() << '\n';

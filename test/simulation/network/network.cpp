@@ -254,7 +254,8 @@ void network::inspect(const endpoint& from, std::string_view datagram) {
 }
 
 void network::carry(unsigned from, unsigned to, dice& chance, std::string_view datagram, const delivery& deliver) {
-    if (!reaches(from, to) || (connected_ && !connected_(from, to)) || chance.chance(weather_.lost)) {
+    const auto more = fate_ ? fate_(from, to) : std::optional{std::chrono::microseconds{0}};
+    if (!more || !reaches(from, to) || (connected_ && !connected_(from, to)) || chance.chance(weather_.lost)) {
         watcher_.saw("net", "loses", secured_ ? "a sealed datagram" : datagram);
         return;
     }
@@ -263,7 +264,7 @@ void network::carry(unsigned from, unsigned to, dice& chance, std::string_view d
         bytes.pop_back();
     }
     const auto way = [&] {
-        auto span = weather_.least + chance.within(weather_.spread);
+        auto span = *more + weather_.least + chance.within(weather_.spread);
         if (chance.chance(weather_.late)) {
             span += chance.within(much_later);
         }

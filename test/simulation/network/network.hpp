@@ -80,6 +80,9 @@ class network {
     void mute(unsigned from, unsigned to, time_point until);
     /// Only these hosts are connected; the others refuse to be dialled.
     void connect_only(std::function<bool(unsigned a, unsigned b)> connected) { connected_ = std::move(connected); }
+    /// What happens to a datagram on the way from one host to another: its additional delay; nothing: it is lost.
+    using fate = std::function<std::optional<std::chrono::microseconds>(unsigned from, unsigned to)>;
+    void impair(fate how) { fate_ = std::move(how); }
     /// Bytes of streams that have arrived anywhere, and those of routes in them.
     struct traffic {
         std::uint64_t all = 0;
@@ -162,6 +165,7 @@ class network {
     weather weather_;
     traffic arrived_;
     std::function<bool(unsigned a, unsigned b)> connected_; // empty: all are
+    fate fate_;                                             // empty: only the weather counts
     bool stormy_ = false;
     bool secured_ = false;
     eavesdropper eavesdropper_;
