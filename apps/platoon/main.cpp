@@ -9,6 +9,7 @@
 #include "platoon/drive/drive.hpp"
 #include "platoon/drive/relay.hpp"
 #include "platoon/drive/vehicle_node.hpp"
+#include "platoon/drive/watch.hpp"
 #include "platoon/simulate_command.hpp"
 #include "platoon/simulation/outcome.hpp"
 
@@ -73,6 +74,7 @@ struct arguments {
         }
         return out;
     }
+    [[nodiscard]] bool in_place() const { return !json && (view || ::isatty(STDOUT_FILENO) == 1); }
     [[nodiscard]] std::vector<platoon::incident> incidents(std::size_t all_vehicles) const;
     [[nodiscard]] cles::multicast_options group_options() const {
         const char* variable = std::getenv("CLES_MULTICAST");
@@ -145,6 +147,23 @@ platoon::scenario scenario_of(const arguments& args) {
             .setup = args.setup()};
 }
 
+// Before a drive of minutes.
+void check_record(const arguments& args) {
+    if (!args.record.empty()) {
+        platoon::check_writable(args.record);
+    }
+}
+
+/// \return the exit code
+int tell(const platoon::recording& drive, const arguments& args) {
+    std::puts(args.json ? cles::to_json(drive).c_str() : summary_of(drive).c_str());
+    std::fflush(stdout);
+    if (!args.record.empty()) {
+        write(drive, args.record);
+    }
+    return exit_code_of(drive.verdict, drive.steady);
+}
+
 int run(const arguments& args) {
     const std::size_t vehicles = args.vehicles != 0 ? args.vehicles : 10;
     const auto losses = args.losses(); // checks them
@@ -162,18 +181,22 @@ int run(const arguments& args) {
                                    .keys = args.fleet,
                                    .secured = args.secured,
                                    .quiet = args.json,
-                                   .in_place = !args.json && (args.view || ::isatty(STDOUT_FILENO) == 1)};
-    if (!args.record.empty()) {
-        platoon::check_writable(args.record); // before a drive of minutes
-    }
+                                   .in_place = args.in_place()};
+    check_record(args);
     ::unsetenv("CLES_KEYS"); // it would be the key of every vehicle
-    const auto drive = platoon::drive(options);
-    std::puts(args.json ? cles::to_json(drive).c_str() : summary_of(drive).c_str());
-    std::fflush(stdout);
-    if (!args.record.empty()) {
-        write(drive, args.record);
-    }
-    return exit_code_of(drive.verdict, drive.steady);
+    return tell(platoon::drive(options), args);
+}
+
+int watch(const arguments& args) {
+    const platoon::watch_options options{.seconds = args.seconds,
+                                         .setup = args.setup(),
+                                         .group = args.group_options(),
+                                         .insecure = args.insecure,
+                                         .keys = args.keys.given_directory(),
+                                         .quiet = args.json,
+                                         .in_place = args.in_place()};
+    check_record(args);
+    return tell(platoon::watch(options), args);
 }
 
 int vehicle(const arguments& args) {
@@ -292,6 +315,9 @@ int dispatch(const CLI::App& app, const arguments& args) {
     if (app.got_subcommand("relay")) {
         return relay(args);
     }
+    if (app.got_subcommand("watch")) {
+        return watch(args);
+    }
     return app.got_subcommand("run") ? run(args) : vehicle(args);
 }
 
@@ -310,6 +336,7 @@ int main(int argc, char** argv) {
     auto& search = *app.add_subcommand("tune", "Search the gains of the control law, in virtual time");
     auto& on_road = *app.add_subcommand("run", "Run a drive, with a process for each vehicle");
     auto& one = *app.add_subcommand("vehicle", "Run one vehicle: lead, follow, or join a platoon");
+    auto& beside = *app.add_subcommand("watch", "Watch the vehicles of a group, whoever has started them");
     auto& between = *app.add_subcommand("relay", "Carry packets between the networks of vehicles")->group("");
     for (auto* command : {&in_time, &search, &on_road, &one}) {
         add_common(*command, args);
@@ -336,13 +363,19 @@ int main(int argc, char** argv) {
     on_road
         .add_flag("--secured", args.secured, "The same with a fleet for this drive alone, whose keys are then removed")
         ->excludes("--keys");
-    on_road.add_flag("--view", args.view, "Show a table that changes in place, even if stdout is not a terminal");
-    for (auto* command : {&in_time, &on_road}) {
+    for (auto* command : {&on_road, &beside}) {
+        command->add_flag("--view", args.view, "Show a table that changes in place, even if stdout is not a terminal");
+    }
+    for (auto* command : {&in_time, &on_road, &beside}) {
         command->add_option("--record", args.record, "Write a complete record, for plots")->type_name("FILE");
         command->add_flag("--json", args.json, "Print a JSON object, and no progress");
     }
     add_group(on_road, args);
     add_group(one, args);
+    add_group(beside, args);
+    beside.add_option("--seconds", args.seconds, "Duration (default: until it is interrupted)")
+        ->check(CLI::Range(1.0, 86400.0));
+    args.keys.add_optional_to(beside, "The directory with the key of a member that may receive states");
     args.keys.add_optional_to(one, "The directory with the vehicle's key: all is sealed, and its states are signed");
     one.add_option("--name", args.name, "The name of the vehicle (default: that of its key)");
     auto* const lead = one.add_flag("--lead", args.lead, "Lead the platoon");

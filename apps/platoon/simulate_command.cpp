@@ -46,13 +46,14 @@ recording record_of(scenario what, bool with_courses) {
         while (out.courses.size() < all.size()) { // it has joined
             course joined{.vehicle = name_of(out.courses.size())};
             for (std::size_t i = 0; i < out.t.size(); ++i) {
-                extend(joined, {.x = NAN, .v = NAN, .a = NAN}, NAN, NAN);
+                extend(joined, {.x = NAN, .v = NAN, .a = NAN}, NAN, NAN, "");
             }
             out.courses.push_back(std::move(joined));
         }
         out.t.push_back(now);
         for (std::size_t i = 0; i < all.size(); ++i) {
-            extend(out.courses[i], all[i].where, all[i].distance, all[i].desired);
+            extend(out.courses[i], all[i].where, all[i].distance, all[i].desired,
+                   boost::describe::enum_to_string(all[i].mode, ""));
         }
     });
     return out;

@@ -5,11 +5,13 @@
 import json
 import math
 import os
+import re
 import subprocess
 import tempfile
+import time
 import unittest
 
-from processes import PATIENCE, PLATOON, DriveTest, ended, environment
+from processes import PATIENCE, PLATOON, DriveTest, ended, environment, free_group, start
 from two_hosts import Hosts
 
 
@@ -73,7 +75,7 @@ class Drive(DriveTest):
         self.assertAlmostEqual(degrees * 111200 / math.cos(math.radians(30)), driven, delta=0.01 * driven)
 
 
-class TwoHosts(unittest.TestCase):
+class Others(unittest.TestCase):
     def at(self, host, *arguments):
         return subprocess.Popen([*self.hosts.inside(host), PLATOON, *map(str, arguments)], stdin=subprocess.DEVNULL,
                                 stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment())
@@ -95,7 +97,54 @@ class TwoHosts(unittest.TestCase):
         out, err = joins.communicate(timeout=PATIENCE)
         self.assertEqual(joins.returncode, 0, err)
         self.assertGreater(json.loads(out)["received"], 10, err)
-        self.assertIn("v1  left: ended normally", "".join(watcher.stdout.readline() for _ in range(4)))
+        self.read_until(watcher, r"s  v1  left: ended normally$")
+
+    def read_until(self, process, expression):
+        """The first of the next lines that contains it."""
+        for line in process.stdout:
+            if re.search(expression, line):
+                return line
+        raise AssertionError(f"it ended: {process.stderr.read()}")
+
+    def test_vehicles_of_another_host_count_and_are_watched(self):
+        self.hosts = Hosts()
+        self.addCleanup(self.hosts.close)
+        far = ["--multicast", "v1", "--insecure", "--brake-at", 3, "--slow", 22, "--slow-for", 0.5]
+        start_ns = time.monotonic_ns() + 1_500_000_000
+        start_utc = time.time() + 1.5
+        for i in range(3):
+            vehicle = self.at(self.hosts.far, "vehicle", "--name", f"far{i}", "--x", -15 * i, "--turn", i, "--turns", 3,
+                              "--start-ns", start_ns, "--start-utc", start_utc,
+                              *(["--ahead", f"far{i - 1}"] if i else ["--lead"]), *far)
+            self.addCleanup(ended, vehicle)
+        with tempfile.TemporaryDirectory() as folder:
+            file = os.path.join(folder, "record.json")
+            watcher = self.at(self.hosts.near, "watch", "--multicast", "v0", "--insecure", "--record", file, "--seconds", 11)
+            self.addCleanup(ended, watcher)
+            self.read_until(watcher, r"\d s  3 vehicles, .*, 15\.00 m apart")
+            said, err = watcher.communicate(timeout=PATIENCE)
+            self.assertEqual((watcher.returncode, err), (0, ""))
+            with open(file, encoding="utf-8") as record:
+                found = json.load(record)
+        self.assertRegex(said, r"(?m)^platoon   3 vehicles, watched for 1\d\.\d s\nspacing   0\.\d+ m off at most, behind far0; "
+                               r"string ratio 0\.9\d+$")
+        self.assertEqual([course["vehicle"] for course in found["courses"]], ["far0", "far1", "far2"])
+        leader, follower = found["courses"][0], found["courses"][1]
+        self.assertLess(min(a for a in leader["acceleration"] if a is not None), -2)
+        self.assertLessEqual({"lead"}, set(leader["mode"]))
+        self.assertIn("follow", follower["mode"])
+        self.assertTrue(all(len(leader[name]) == len(found["t"]) for name in ("acceleration", "mode", "speed")))
+
+    def test_a_drive_counts_those_that_others_have_started(self):
+        group = free_group()
+        watcher = start("run", "--multicast", group, "--vehicles", 2, "--seconds", 20)
+        self.addCleanup(ended, watcher)
+        self.assertRegex(watcher.stdout.readline(), r"\d s  2 vehicles")
+        joins = start("vehicle", "--name", "v9", "--multicast", group, "--seconds", 60)
+        self.addCleanup(ended, joins)
+        self.read_until(watcher, r"\d s  3 vehicles")
+        joins.kill()
+        self.read_until(watcher, r"s  v9  silent$")
 
 
 if __name__ == "__main__":

@@ -22,6 +22,13 @@ class Usage(unittest.TestCase):
         self.assertEqual((code, out), (3, ""))
         self.assertEqual(err, f"cles-platoon: there is no platoon: no vehicle was found in the group {group[3:]}\n")
 
+    def test_nobody_can_be_watched(self):
+        group = free_group()
+        for options in ([], ["--json"]):
+            self.assertEqual(run("watch", "--multicast", group, "--seconds", 2, *options),
+                             (3, "",
+                              f"cles-platoon: there is no platoon: no vehicle was found in the group {group[3:]}\n"))
+
     def test_the_one_ahead_is_not_there(self):
         code, out, err = run("vehicle", "--name", "v1", "--ahead", "v0", "--multicast", free_group(), "--seconds", 2)
         self.assertEqual((code, out), (0, ""))

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "platoon/drive/course.hpp"
 
+#include "platoon/driver/motion.hpp"
+#include "platoon/simulation/assessment.hpp"
+
+#include <boost/describe/enum_to_string.hpp>
+
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace platoon {
 namespace {
@@ -28,67 +34,48 @@ std::vector<double> distances_of(const std::vector<std::optional<motion>>& where
 
 } // namespace
 
-recording course_of(const logbook& book, const std::vector<std::string>& first, const std::vector<std::string>& all,
-                    double end, const drive_options& how) {
-    recording out{.source = "driven",
-                  .vehicles = how.vehicles,
-                  .hz = how.setup.hz,
-                  .loss = how.loss,
-                  .burst = how.burst,
-                  .delay_ms = how.delay * 1000,
-                  .spacing = how.setup.spacing,
-                  .seed = how.seed};
-    assessment spacing_assessment{first.size(), how.setup.spacing, how.setup.limits.length};
-    const auto limits = limits_of(how.vehicles, how.differences, how.setup.limits, how.seed);
-    std::vector<double> desired;
-    std::size_t previous = 0;
-    for (std::size_t i = 0; i < how.vehicles; ++i) {
-        if (std::find(first.begin(), first.end(), name_of(i)) != first.end()) {
-            desired.push_back(
-                wanted_distance(how.setup.spacing, how.setup.plan.speed, limits[i].brake, limits[previous].brake));
-            previous = i;
-        }
-    }
+recording course_of(const logbook& book, const course_setup& how) {
+    recording out;
+    assessment spacing_assessment{how.first.size(), how.spacing, how.length};
     double least = NAN;
-    for (long step = 0; static_cast<double>(step) * sample_step < end; ++step) {
+    for (long step = 0; static_cast<double>(step) * sample_step < how.end; ++step) {
         const double t = static_cast<double>(step) * sample_step;
         std::vector<motion> those_first;
         std::vector<motion> present;
         std::vector<std::optional<motion>> where;
-        for (const auto& name : all) {
+        for (const auto& name : how.all) {
             where.push_back(book.position(name, t));
             if (where.back()) {
                 present.push_back(*where.back());
             }
         }
-        for (const auto& name : first) {
+        for (const auto& name : how.first) {
             if (const auto at = book.position(name, t)) {
                 those_first.push_back(*at);
             }
         }
-        if (t >= how.setup.plan.recovery()) {
+        if (t >= how.recovery) {
             spacing_assessment.begin_recovery();
         }
-        if (those_first.size() == first.size()) {
-            spacing_assessment.sample(those_first, desired);
+        if (t >= how.begin && those_first.size() == how.first.size()) {
+            spacing_assessment.sample(those_first, how.desired);
         }
-        least = std::fmin(least, least_gap(present, how.setup.limits.length));
+        least = std::fmin(least, least_gap(present, how.length));
         if (step % std::lround(record_step / sample_step) != 0) {
             continue;
         }
         out.t.push_back(t);
-        out.courses.resize(all.size());
+        out.courses.resize(how.all.size());
         const auto distances = distances_of(where);
-        for (std::size_t i = 0; i < all.size(); ++i) {
-            out.courses[i].vehicle = all[i];
-            extend(out.courses[i], where[i].value_or(motion{.x = NAN, .v = NAN, .a = NAN}), distances[i],
-                   how.setup.spacing);
+        for (std::size_t i = 0; i < how.all.size(); ++i) {
+            out.courses[i].vehicle = how.all[i];
+            extend(out.courses[i], where[i].value_or(motion{.x = NAN, .v = NAN, .a = NAN}), distances[i], how.spacing,
+                   where[i] ? boost::describe::enum_to_string(book.mode(how.all[i], t), "") : "");
         }
     }
     out.verdict = spacing_assessment.result();
     out.verdict.least_gap = least;
     out.verdict.collision = least <= 0;
-    out.verdict.ended = end >= how.setup.plan.end();
     return out;
 }
 

@@ -1,17 +1,25 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "platoon/drive/drive.hpp"
 #include "platoon/drive/logbook.hpp"
+#include "platoon/drive/recording.hpp"
 
 #include <string>
 #include <vector>
 
 namespace platoon {
 
-/// The record of a drive, from its logbook. \param first the vehicles at the start, in their order \param all vehicles
-/// that took part
-recording course_of(const logbook& book, const std::vector<std::string>& first, const std::vector<std::string>& all,
-                    double end, const drive_options& how);
+/// How a drive is evaluated.
+struct course_setup {
+    std::vector<std::string> first{}; ///< the vehicles at the start, in their order; at least one
+    std::vector<double> desired{};    ///< the distance of each to the one ahead, m; that of the first does not count
+    std::vector<std::string> all{};   ///< that took part
+    double begin = 0, end = 0;        ///< the verdict is on the time between
+    double spacing = 0, length = 0;
+    double recovery = 0; ///< when the second half of the manoeuvre begins
+};
+
+/// The courses of all vehicles and the verdict, from a logbook; the rest of the recording is empty.
+recording course_of(const logbook& book, const course_setup& how);
 
 } // namespace platoon

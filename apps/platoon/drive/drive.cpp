@@ -7,6 +7,7 @@
 #include "platoon/drive/child.hpp"
 #include "platoon/drive/course.hpp"
 #include "platoon/drive/laboratory_fleet.hpp"
+#include "platoon/drive/observer.hpp"
 #include "platoon/drive/relay.hpp"
 #include "platoon/drive/temporary_folder.hpp"
 #include "platoon/drive/vehicle_networks.hpp"
@@ -27,6 +28,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -41,6 +43,7 @@ namespace {
 constexpr auto poll_interval = 20ms;
 constexpr auto discovery_time = 400ms;
 constexpr double process_timeout = 10; // s
+constexpr double gone_after = 2;       // s without an update of a vehicle that is not ours
 
 /// With those that merge.
 std::size_t all_vehicles(const drive_options& options) {
@@ -74,6 +77,16 @@ void check_keys(const drive_options& options, const std::string& fleet) {
                               ": name the folder of a fleet, which 'cles fleet init DIR --with " + all +
                               "' creates; to an existing one, 'cles keys new' and 'cles fleet add' add members");
     }
+}
+
+// Under the table.
+std::string last_lines(const std::vector<std::string>& all) {
+    constexpr std::size_t most = 5;
+    std::string text;
+    for (std::size_t i = all.size() - std::min(all.size(), most); i < all.size(); ++i) {
+        text += all[i];
+    }
+    return text;
 }
 
 bool has_faults(const drive_options& options) { return options.loss > 0 || options.delay > 0; }
@@ -163,9 +176,11 @@ class drive_supervisor {
     }
 
     void take(const std::string& from, const localization& what) {
-        const auto told = to_state(what, start_utc_);
-        if (implausible(told, options_.setup.law).empty()) {
-            book_.add(from, told);
+        if (const auto changed = observer_.take(from, to_state(what, start_utc_), now())) {
+            tell(*changed);
+            if (!children_.contains(from)) { // it sends no report
+                events_.push_back(*changed);
+            }
         }
     }
 
@@ -207,9 +222,10 @@ class drive_supervisor {
         std::size_t previous = 0;
         for (std::size_t i = 0; i < n; ++i) {
             if (!joins(i)) {
-                x -= first_.empty()
-                         ? 0
-                         : wanted_distance(options_.setup.spacing, speed, limits_[i].brake, limits_[previous].brake);
+                desired_.push_back(first_.empty() ? 0
+                                                  : wanted_distance(options_.setup.spacing, speed, limits_[i].brake,
+                                                                    limits_[previous].brake));
+                x -= desired_.back();
                 previous = i;
                 start(i, x,
                       first_.empty() ? std::vector<std::string>{"--lead"}
@@ -225,6 +241,7 @@ class drive_supervisor {
             co_await pause(poll_interval);
             check_receiver();
             check_children();
+            check_others();
             apply_incidents();
             if (now() >= shown + (options_.in_place ? 0.2 : 1)) {
                 shown = now();
@@ -250,12 +267,13 @@ class drive_supervisor {
             co_await pause(poll_interval);
             check_receiver();
             check_children();
-            const auto missing = std::find_if(first_.begin(), first_.end(),
-                                              [this](const auto& name) { return book_.last(name) == nullptr; });
+            const auto missing = std::find_if(first_.begin(), first_.end(), [this](const auto& name) {
+                return observer_.book().last(name) == nullptr;
+            });
             if (missing == first_.end() || interrupted_) {
                 co_return;
             }
-            if (book_.has_ended(*missing)) {
+            if (observer_.book().has_ended(*missing)) {
                 throw cles::error(cles::errc::unavailable, *missing + " did not start: " + last_line(*missing));
             }
             if (now() > process_timeout) {
@@ -351,14 +369,46 @@ class drive_supervisor {
             throw cles::error(cles::errc::unavailable, "the relay has ended: " + said.substr(0, said.find('\n')));
         }
         for (auto& [name, process] : children_) {
-            if (process.running() || book_.has_ended(name)) {
+            if (process.running() || observer_.book().has_ended(name)) {
                 continue;
             }
             const int status = process.status();
             const bool well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
-            book_.record_end(name, well);
+            observer_.record_end(name, well);
             disturbed_ = true;
             note(name, well ? "left" : "gone", well ? "ended normally" : exit_text(status) + last_line(name));
+        }
+    }
+
+    // Vehicles of other hosts, or that somebody else has started.
+    void check_others() {
+        for (const auto& each : observer_.end_silent(now(), gone_after, own_names())) {
+            tell(each);
+            events_.push_back(each);
+        }
+    }
+
+    [[nodiscard]] std::set<std::string> own_names() const {
+        std::set<std::string> names;
+        for (const auto& [name, process] : children_) {
+            names.insert(name);
+        }
+        return names;
+    }
+
+    // If others have joined, those who are in the lane when the leader brakes are judged, from then on.
+    void judge_all(course_setup& how) {
+        const auto& names = how.all;
+        if (std::all_of(names.begin(), names.end(), [this](const auto& name) { return children_.contains(name); })) {
+            return;
+        }
+        const auto& plan = options_.setup.plan;
+        how.begin = plan.brake_at;
+        const auto lane = observer_.lane(how.begin);
+        disturbed_ = disturbed_ || how.begin >= end_ || lane.size() < 2 || observer_.lane(end_) != lane;
+        if (lane.size() >= 2) {
+            how.first = lane;
+            how.desired = observer_.desired(lane, how.spacing, plan.speed);
         }
     }
 
@@ -377,8 +427,16 @@ class drive_supervisor {
 
     void note(const std::string& vehicle, const std::string& what, const std::string& why) {
         events_.push_back({now(), vehicle, what, why});
-        if (!options_.quiet && !options_.in_place) {
-            std::printf("%6.1f s  %s  %s: %s\n", now(), vehicle.c_str(), what.c_str(), why.c_str());
+        tell(events_.back());
+    }
+
+    void tell(const event& what) {
+        if (!options_.quiet) {
+            news_.push_back(line_of(what));
+            if (!options_.in_place) {
+                std::fputs(news_.back().c_str(), stdout);
+                std::fflush(stdout);
+            }
         }
     }
 
@@ -386,15 +444,14 @@ class drive_supervisor {
         if (options_.quiet) {
             return;
         }
-        std::vector<std::string> names;
-        for (const auto& [name, process] : children_) {
-            names.push_back(name);
-        }
+        const auto names = observer_.vehicles();
         const double silent = driver::silent_after / options_.setup.hz;
         if (!options_.in_place) {
-            std::fputs(line_of(book_, names, now(), options_.setup.spacing, silent).c_str(), stdout);
+            std::fputs(line_of(observer_.book(), names, now(), options_.setup.spacing, silent).c_str(), stdout);
         } else {
-            std::printf("\x1b[H\x1b[J%s", table_of(book_, names, now(), options_.setup.spacing, silent).c_str());
+            std::printf("\x1b[H\x1b[J%s%s",
+                        table_of(observer_.book(), names, now(), options_.setup.spacing, silent).c_str(),
+                        last_lines(news_).c_str());
         }
         std::fflush(stdout);
     }
@@ -412,7 +469,25 @@ class drive_supervisor {
     }
 
     recording conclude() {
-        recording out = course_of(book_, first_, children_names(), end_, options_);
+        const auto& setup = options_.setup;
+        course_setup how{.first = first_,
+                         .desired = desired_,
+                         .all = observer_.vehicles(),
+                         .end = end_,
+                         .spacing = setup.spacing,
+                         .length = setup.limits.length,
+                         .recovery = setup.plan.recovery()};
+        judge_all(how);
+        recording out = course_of(observer_.book(), how);
+        out.verdict.ended = end_ >= setup.plan.end();
+        out.source = "driven";
+        out.vehicles = std::max(options_.vehicles, how.all.size());
+        out.hz = setup.hz;
+        out.loss = options_.loss;
+        out.burst = options_.burst;
+        out.delay_ms = options_.delay * 1000;
+        out.spacing = setup.spacing;
+        out.seed = options_.seed;
         out.steady = !disturbed_ && options_.incidents.empty();
         out.events = events_;
         std::vector<double> latencies;
@@ -442,14 +517,6 @@ class drive_supervisor {
         return out;
     }
 
-    [[nodiscard]] std::vector<std::string> children_names() const {
-        std::vector<std::string> names;
-        for (const auto& [name, process] : children_) {
-            names.push_back(name);
-        }
-        return names;
-    }
-
     const drive_options& options_;
     asio::io_context io_{1};
     asio::signal_set signals_;                     ///< before there are files that have to be removed in the end
@@ -458,12 +525,14 @@ class drive_supervisor {
     std::string keys_;                             ///< the folder of the fleet; empty: without security
     std::vector<vehicle_limits> limits_;           ///< of each vehicle
     std::size_t merged_ = 0;                       ///< how many were started to merge
-    logbook book_;
+    observer observer_{options_.setup.law};
     cles::service service_;
     std::vector<incident> open_;
     std::map<std::string, child> children_;
     std::vector<std::string> first_; ///< the vehicles at the start, the leader first
+    std::vector<double> desired_;    ///< the distance of each of them to the one ahead
     std::vector<event> events_;
+    std::vector<std::string> news_; ///< the same, and changes of modes, in lines
     relay_count relayed_;
     std::string foreign_vehicle_;
     std::exception_ptr receive_failure_; ///< why updates are no longer received

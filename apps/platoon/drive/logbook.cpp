@@ -29,6 +29,8 @@ void logbook::add(const std::string& vehicle, const state& told) {
 
 void logbook::record_end(const std::string& vehicle, bool left) { ended_.try_emplace(vehicle, left); }
 
+void logbook::record_return(const std::string& vehicle) { ended_.erase(vehicle); }
+
 bool logbook::has_left(const std::string& vehicle) const {
     const auto found = ended_.find(vehicle);
     return found != ended_.end() && found->second;
@@ -37,6 +39,16 @@ bool logbook::has_left(const std::string& vehicle) const {
 const state* logbook::last(const std::string& vehicle) const {
     const auto found = states_.find(vehicle);
     return found == states_.end() ? nullptr : &found->second.back();
+}
+
+role logbook::mode(const std::string& vehicle, double t) const {
+    const auto found = states_.find(vehicle);
+    if (found == states_.end()) {
+        return role::lead;
+    }
+    const auto next = std::upper_bound(found->second.begin(), found->second.end(), t,
+                                       [](double at, const state& s) { return at < s.t; });
+    return next == found->second.begin() ? role::lead : (next - 1)->mode;
 }
 
 std::optional<motion> logbook::position(const std::string& vehicle, double t) const {

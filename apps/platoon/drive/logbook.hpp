@@ -17,8 +17,12 @@ class logbook {
     void add(const std::string& vehicle, const state& told);
     /// Its process has ended. \param left as planned: it is no longer on the lane; otherwise it stays there, and brakes
     void record_end(const std::string& vehicle, bool left);
+    /// It had not.
+    void record_return(const std::string& vehicle);
     /// Nothing before its first update, while it is in the next lane, and after it has left.
     [[nodiscard]] std::optional<motion> position(const std::string& vehicle, double t) const;
+    /// As of its last update before that time; `lead` before the first.
+    [[nodiscard]] role mode(const std::string& vehicle, double t) const;
     /// Its last update, or null.
     [[nodiscard]] const state* last(const std::string& vehicle) const;
     [[nodiscard]] bool has_ended(const std::string& vehicle) const { return ended_.contains(vehicle); }

@@ -11,7 +11,9 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
+#include <utility>
 
 namespace platoon {
 namespace {
@@ -23,16 +25,31 @@ constexpr double budget_us = 100'000;
     throw cles::error(code, "cannot write " + path + ": " + code.message());
 }
 
+// The vehicle at that place at the beginning; without courses, they are numbered from the front.
+std::string one_ahead(const recording& drive, std::ptrdiff_t place) {
+    std::vector<std::pair<double, std::string>> order;
+    for (const auto& each : drive.courses) {
+        if (!each.place.empty() && !std::isnan(each.place.front())) {
+            order.emplace_back(-each.place.front(), each.vehicle);
+        }
+    }
+    std::sort(order.begin(), order.end());
+    const auto index = static_cast<std::size_t>(place);
+    return index < order.size() ? order[index].second : "v" + std::to_string(index);
+}
+
 } // namespace
 
-void extend(course& of, const motion& where, double distance, double spacing) {
+void extend(course& of, const motion& where, double distance, double spacing, const std::string& mode) {
     const auto place = std::isnan(where.x) ? geo::geographic{.lat = NAN, .lon = NAN} : place_on_road(where.x);
     of.speed.push_back(where.v);
+    of.acceleration.push_back(where.a);
     of.error.push_back(distance - spacing);
     of.distance.push_back(distance);
     of.place.push_back(where.x);
     of.lat.push_back(place.lat);
     of.lon.push_back(place.lon);
+    of.mode.push_back(mode);
 }
 
 latency_summary summarise(std::vector<double> latencies_us) {
@@ -63,15 +80,20 @@ std::string summary_of(const recording& drive) {
     const auto add = [&](int length) {
         text.append(line.data(), std::min(line.size() - 1, static_cast<std::size_t>(length)));
     };
-    add(std::snprintf(line.data(), line.size(), "platoon   %zu vehicles at %g Hz, %g %% lost, up to %g ms late\n",
-                      drive.vehicles, drive.hz, drive.loss * 100, drive.delay_ms));
+    if (drive.hz > 0) {
+        add(std::snprintf(line.data(), line.size(), "platoon   %zu vehicles at %g Hz, %g %% lost, up to %g ms late\n",
+                          drive.vehicles, drive.hz, drive.loss * 100, drive.delay_ms));
+    } else {
+        add(std::snprintf(line.data(), line.size(), "platoon   %zu vehicles, watched for %.1f s\n", drive.vehicles,
+                          drive.t.empty() ? 0 : drive.t.back()));
+    }
     if (drive.burst > 0) {
         add(std::snprintf(line.data(), line.size(), "losses    in bursts of %g updates on average\n", drive.burst));
     }
-    if (drive.steady && !std::isnan(v.least_gap)) {
+    if (drive.steady && !std::isnan(v.least_gap) && !v.error.empty()) {
         const auto most = std::max_element(v.error.begin(), v.error.end());
-        add(std::snprintf(line.data(), line.size(), "spacing   %.3f m off at most, behind v%td; string ratio %.4f\n",
-                          *most, most - v.error.begin(), v.string_ratio));
+        add(std::snprintf(line.data(), line.size(), "spacing   %.3f m off at most, behind %s; string ratio %.4f\n",
+                          *most, one_ahead(drive, most - v.error.begin()).c_str(), v.string_ratio));
         if (!std::isnan(v.first_ratio)) {
             add(std::snprintf(line.data(), line.size(),
                               "first     errors of up to %.4f times the one behind the leader\n", v.first_ratio));
@@ -99,6 +121,9 @@ std::string summary_of(const recording& drive) {
     } else {
         add(std::snprintf(line.data(), line.size(), "gap       %.3f m at least%s\n", v.least_gap,
                           v.collision ? ": A COLLISION" : ""));
+    }
+    if (drive.hz == 0) {
+        return text;
     }
     add(std::snprintf(line.data(), line.size(), "radar     %ju times alone because updates were missing\n",
                       std::uintmax_t{drive.radar_spells}));

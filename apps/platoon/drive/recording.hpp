@@ -16,15 +16,17 @@ namespace platoon {
 /// One vehicle over the time of a drive; null (NaN) while it is not on the lane.
 struct course {
     std::string vehicle{};
-    std::vector<double> speed{}, error{}; ///< m/s; m, of the distance to the one ahead (the leader has none)
-    std::vector<double> distance{};       ///< to the one ahead in the lane, front to front, m
-    std::vector<double> place{};          ///< along the road, m
-    std::vector<double> lat{}, lon{};     ///< degrees
+    std::vector<double> speed{}, acceleration{}; ///< m/s, m/s²
+    std::vector<double> error{};                 ///< m, of the distance to the one ahead (the leader has none)
+    std::vector<double> distance{};              ///< to the one ahead in the lane, front to front, m
+    std::vector<double> place{};                 ///< along the road, m
+    std::vector<double> lat{}, lon{};            ///< degrees
+    std::vector<std::string> mode{};             ///< empty while it is not on the lane
 };
-BOOST_DESCRIBE_STRUCT(course, (), (vehicle, speed, error, distance, place, lat, lon))
+BOOST_DESCRIBE_STRUCT(course, (), (vehicle, speed, acceleration, error, distance, place, lat, lon, mode))
 
 /// Adds a moment to it; all are NaN where the vehicle is not there. \param spacing the desired distance
-void extend(course& of, const motion& where, double distance, double spacing);
+void extend(course& of, const motion& where, double distance, double spacing, const std::string& mode);
 
 /// The latencies of updates, in microseconds.
 struct latency_summary {
@@ -39,7 +41,7 @@ latency_summary summarise(std::vector<double> latencies_us);
 
 /// The complete record of a drive, simulated or not.
 struct recording {
-    std::string source{};
+    std::string source{}; ///< "control law", "driven" or "watched"
     std::size_t vehicles = 0;
     double hz = 0, loss = 0, burst = 0, delay_ms = 0, spacing = 0; ///< burst: updates, on average; 0: independent
     std::uint64_t seed = 0;

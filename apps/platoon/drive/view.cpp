@@ -96,4 +96,10 @@ std::string line_of(const logbook& book, const std::vector<std::string>& vehicle
     return text + "\n";
 }
 
+std::string line_of(const event& what) {
+    std::array<char, 32> time{};
+    std::snprintf(time.data(), time.size(), "%6.1f s  ", what.t);
+    return time.data() + what.vehicle + "  " + what.mode + (what.why.empty() ? "" : ": " + what.why) + "\n";
+}
+
 } // namespace platoon

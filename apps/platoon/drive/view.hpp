@@ -2,6 +2,7 @@
 #pragma once
 
 #include "platoon/drive/logbook.hpp"
+#include "platoon/driver/vehicle_report.hpp"
 
 #include <string>
 #include <vector>
@@ -15,5 +16,8 @@ std::string table_of(const logbook& book, const std::vector<std::string>& vehicl
 /// The same in one line.
 std::string line_of(const logbook& book, const std::vector<std::string>& vehicles, double t, double spacing,
                     double silent_after);
+
+/// What has happened to a vehicle, in one line.
+std::string line_of(const event& what);
 
 } // namespace platoon

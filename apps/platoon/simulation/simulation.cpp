@@ -236,7 +236,7 @@ class simulated_platoon {
         if (watch) {
             std::vector<sighting> seen;
             for (std::size_t i = 0; i < all_.size(); ++i) {
-                seen.push_back({truth(i, now), all_[i].who.desired_distance(), NAN, false});
+                seen.push_back({truth(i, now), all_[i].who.desired_distance(), NAN, false, all_[i].who.mode()});
             }
             for (std::size_t k = 0; k < lane_.size(); ++k) {
                 seen[lane_[k]].in_lane = true;

@@ -48,6 +48,7 @@ struct sighting {
     double desired = 0;  ///< distance to the one ahead, front to front, m
     double distance = 0; ///< to the one ahead in the lane; NaN: there is none
     bool in_lane = true;
+    role mode = role::follow;
 };
 
 /// A platoon in virtual time. \param watch is called a hundred times per second with all vehicles; those that join are
