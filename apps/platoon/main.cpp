@@ -13,6 +13,8 @@
 #include "platoon/simulate_command.hpp"
 #include "platoon/simulation/outcome.hpp"
 
+#include <boost/describe/enum_from_string.hpp>
+
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
@@ -28,16 +30,19 @@ struct arguments {
     double hz = 25, seconds = 0, loss_percent = 0, burst = 0, delay_ms = 0;
     std::vector<double> lags{}, brakes{};
     platoon::manoeuvre plan{};
-    double lag = platoon::vehicle_limits{}.lag, brake = platoon::vehicle_limits{}.brake;
+    double lag = platoon::vehicle_limits{}.lag, brake = platoon::vehicle_limits{}.brake, length = platoon::usual_length;
     std::uint64_t seed = 1, first_seed = 1;
     unsigned seeds = 1;
     std::string controller = "leader", group{}, record{};
+    std::vector<std::size_t> minimum{}, older{};
+    bool leader_unknown = false;
+    std::string dialect = "current";
     std::vector<std::string> vanishes{}, mutes{}, joins{}, leaves{}, merges{}, splits{};
     bool json = false, view = false, lead = false, join = false, report = false, insecure = false, secured = false,
          no_radar = false;
     tool::keys_option keys{}; // of a vehicle
     std::string fleet{};
-    std::string name{}, ahead{}, behind{};
+    std::string name{}, ahead{}, behind{}, leader{};
     double x = 0;
     std::size_t turn = 0, turns = 1;
     std::int64_t start_ns = 0;
@@ -137,6 +142,17 @@ std::vector<platoon::incident> arguments::incidents(std::size_t all_vehicles) co
 
 platoon::scenario scenario_of(const arguments& args) {
     const std::size_t vehicles = args.vehicles != 0 ? args.vehicles : 20;
+    std::vector<platoon::dialect> dialects(vehicles);
+    const auto set = [&](const char* option, const std::vector<std::size_t>& which, platoon::dialect how) {
+        for (const auto each : which) {
+            if (each >= vehicles) {
+                throw usage_error(std::string{option} + ": the vehicles are 0 to " + std::to_string(vehicles - 1));
+            }
+            dialects[each] = how;
+        }
+    };
+    set("--older", args.older, platoon::dialect::older);
+    set("--minimum", args.minimum, platoon::dialect::minimum);
     return {.vehicles = vehicles,
             .seconds = args.seconds,
             .losses = args.losses(),
@@ -144,7 +160,9 @@ platoon::scenario scenario_of(const arguments& args) {
             .seed = args.first_seed,
             .incidents = args.incidents(vehicles),
             .differences = args.differences(),
-            .setup = args.setup()};
+            .setup = args.setup(),
+            .dialects = std::move(dialects),
+            .leader_known = !args.leader_unknown};
 }
 
 // Before a drive of minutes.
@@ -223,6 +241,9 @@ int vehicle(const arguments& args) {
     driving.start = {args.x, driving.plan.speed, 0};
     driving.limits.lag = args.lag;
     driving.limits.brake = args.brake;
+    driving.limits.length = args.length;
+    driving.leader = args.leader;
+    boost::describe::enum_from_string(args.dialect.c_str(), options.setup.tells);
     if (options.start_ns == 0) {
         options.start_ns = platoon::monotonic_ns();
     }
@@ -295,6 +316,13 @@ void add_seeds(CLI::App& command, arguments& args) {
         ->check(CLI::Range(1.0, 60.0));
     command.add_option("--mute", args.mutes, "Vehicle I sends nothing from T on, for D seconds")->type_name("I@T[+D]");
     command.add_option("--first-seed", args.first_seed, "Seed of the first of them (1)");
+    command.add_option("--minimum", args.minimum, "These vehicles tell only the paper's minimum")
+        ->delimiter(',')
+        ->type_name("I[,I...]");
+    command.add_option("--older", args.older, "These vehicles tell what older ones do")
+        ->delimiter(',')
+        ->type_name("I[,I...]");
+    command.add_flag("--leader-unknown", args.leader_unknown, "Those behind them do not know the leader");
 }
 
 void add_group(CLI::App& command, arguments& args) {
@@ -384,6 +412,10 @@ int main(int argc, char** argv) {
     one.add_option("--behind", args.behind, "Merge behind this vehicle, in the middle of the platoon")
         ->excludes(lead)
         ->excludes(ahead);
+    one.add_option("--leader", args.leader, "The leader, if the vehicle ahead does not tell it")->excludes(lead);
+    one.add_option("--dialect", args.dialect, "What it tells: everything, or what older vehicles do, or the minimum")
+        ->check(CLI::IsMember({"current", "older", "minimum"}));
+    one.add_option("--length", args.length, "The length, m (5)")->check(CLI::Range(1.0, 30.0));
     one.add_option("--lag", args.lag, "The lag of engine and brakes, s (0.3)")->check(CLI::Range(0.05, 2.0));
     one.add_option("--brake", args.brake, "The maximum deceleration, m/s² (8)")->check(CLI::Range(1.0, 12.0));
     one.add_option("--x", args.x, "Position at the start, m");

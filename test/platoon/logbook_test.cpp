@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "platoon/drive/logbook.hpp"
-#include "platoon/simulation/simulation.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -66,8 +66,8 @@ BOOST_AUTO_TEST_CASE(a_platoon_that_stands_or_is_apart_has_failed_unless_that_wa
 }
 
 BOOST_AUTO_TEST_CASE(one_alone_has_no_gap) {
-    BOOST_TEST(std::isnan(platoon::least_gap({{.x = 3}}, 5)));
-    BOOST_TEST(platoon::least_gap({{.x = 3}, {.x = 23}}, 5) == 15);
+    BOOST_TEST(std::isnan(platoon::least_gap({{.x = 3, .length = 5}})));
+    BOOST_TEST(platoon::least_gap({{.x = 3, .length = 9}, {.x = 23, .length = 5}}) == 15);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -103,14 +103,14 @@ class platoon_hosts final : public node_hosts {
         const auto limits = platoon::limits_of(what.vehicles, what.differences, what.setup.limits, what.seed);
         const auto starts = platoon::start_positions(limits, what.setup.spacing, what.setup.plan.speed);
         for (unsigned host = 0; host < what.vehicles; ++host) {
-            platoon::vehicle_setup setup{.driving = what.setup,
+            platoon::vehicle_setup setup{.driving = platoon::setup_of(what, host),
                                          .turn = host,
                                          .turns = what.vehicles,
                                          .start_utc = start_utc,
                                          .seed = what.seed * 1000 + host,
+                                         .tells = platoon::dialect_of(what, host),
                                          .separate_truth = true};
             setup.driving.name = platoon::name_of(host);
-            setup.driving.ahead = host == 0 ? "" : platoon::name_of(host - 1);
             setup.driving.limits = limits[host];
             setup.driving.start = starts[host];
             setup.driving.start.x -= setup.driving.start.v * head_start;
@@ -166,6 +166,7 @@ class platoon_hosts final : public node_hosts {
                                                   node_run::options{.seed = chance_.next(), .multicast = true});
         nodes_[host] = n;
         n->node()->tasks.add(verb::bind, "state", {});
+        n->node()->tasks.add(verb::bind, "localization", {});
         n->start();
         auto& who = vehicles_[host]->who;
         who.begin(who.setup().driving, now());
@@ -194,7 +195,9 @@ class platoon_hosts final : public node_hosts {
         if (!told) {
             return;
         }
-        node(host)->local().publish("state", [&told](json_writer& w) { w.raw(cles::to_json(*told)); });
+        auto& local = node(host)->local();
+        local.publish("state", [&told](json_writer& w) { w.raw(cles::to_json(*told)); });
+        local.publish("localization", [&told](json_writer& w) { w.raw(cles::to_json(localization_of(*told))); });
         for (const auto& each : vehicles_) { // by a link without faults
             if (each->who.seen() == self.who.name()) {
                 each->who.see(self.who.name(), *told);
@@ -223,7 +226,7 @@ class platoon_hosts final : public node_hosts {
             who.note_gap(event.missed, now());
         } else if (event.kind == feed_event::update) {
             try {
-                who.receive(from, cles::from_json<platoon::localization>(event.body), now(), first);
+                who.receive(from, cles::from_json<platoon::state_message>(event.body), now(), first);
             } catch (const error& e) {
                 who.note(now(), "unheard", e.message());
             }
@@ -245,14 +248,16 @@ class platoon_hosts final : public node_hosts {
     void look(double at) {
         std::vector<platoon::motion> where;
         std::vector<double> desired;
+        std::vector<double> lengths;
         for (std::size_t i = 0; i < vehicles_.size(); ++i) {
             where.push_back(truth(i, at));
             desired.push_back(vehicles_[i]->who.who()->desired_distance());
+            lengths.push_back(vehicles_[i]->who.who()->limits().length);
         }
         if (at >= what_.setup.plan.recovery()) {
             result_.begin_recovery();
         }
-        result_.sample(where, desired);
+        result_.sample(where, desired, lengths);
     }
 
     const platoon::scenario& what_;

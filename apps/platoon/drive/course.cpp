@@ -37,16 +37,21 @@ std::vector<double> distances_of(const std::vector<std::optional<motion>>& where
 recording course_of(const logbook& book, const course_setup& how) {
     recording out;
     assessment spacing_assessment{how.first.size(), how.spacing, how.length};
+    std::vector<double> lengths;
+    for (const auto& name : how.first) {
+        const auto* const last = book.last(name);
+        lengths.push_back(last == nullptr ? how.length : last->length);
+    }
     double least = NAN;
     for (long step = 0; static_cast<double>(step) * sample_step < how.end; ++step) {
         const double t = static_cast<double>(step) * sample_step;
         std::vector<motion> those_first;
-        std::vector<motion> present;
+        std::vector<placed> present;
         std::vector<std::optional<motion>> where;
         for (const auto& name : how.all) {
             where.push_back(book.position(name, t));
             if (where.back()) {
-                present.push_back(*where.back());
+                present.push_back({.x = where.back()->x, .length = book.last(name)->length});
             }
         }
         for (const auto& name : how.first) {
@@ -58,9 +63,9 @@ recording course_of(const logbook& book, const course_setup& how) {
             spacing_assessment.begin_recovery();
         }
         if (t >= how.begin && those_first.size() == how.first.size()) {
-            spacing_assessment.sample(those_first, how.desired);
+            spacing_assessment.sample(those_first, how.desired, lengths);
         }
-        least = std::fmin(least, least_gap(present, how.length));
+        least = std::fmin(least, least_gap(present));
         if (step % std::lround(record_step / sample_step) != 0) {
             continue;
         }

@@ -165,7 +165,7 @@ class drive_supervisor {
     [[nodiscard]] double now() const { return static_cast<double>(monotonic_ns() - start_ns_) * 1e-9; }
 
     asio::awaitable<void> hear() {
-        auto feed = co_await service_.async_bind<localization>("all:state");
+        auto feed = co_await service_.async_bind<state_message>("all:state");
         for (;;) {
             const auto item = co_await feed.async_next();
             if (item.has_value()) {
@@ -175,7 +175,7 @@ class drive_supervisor {
         }
     }
 
-    void take(const std::string& from, const localization& what) {
+    void take(const std::string& from, const state_message& what) {
         if (const auto changed = observer_.take(from, to_state(what, start_utc_), now())) {
             tell(*changed);
             if (!children_.contains(from)) { // it sends no report
@@ -188,7 +188,7 @@ class drive_supervisor {
     asio::awaitable<void> hear_behind_relay(std::string name) {
         for (;;) {
             try {
-                auto feed = co_await service_.async_bind<localization>(
+                auto feed = co_await service_.async_bind<state_message>(
                     name + ":state", cles::bind_options{}.at(faults_->url_of(name), name));
                 for (;;) {
                     const auto item = co_await feed.async_next();

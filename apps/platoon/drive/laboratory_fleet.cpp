@@ -20,9 +20,9 @@ namespace security = cles::security;
 using rights = std::vector<std::string>;
 
 // Members find each other by BIND `cles`.
-const security::member_rights of_vehicle{
-    .may = rights{"bind *:cles", "bind *:state", "push *:join"},
-    .offers = rights{"bind *:cles", "bind *:state", "push *:join", "push *:leave", "push *:split"}};
+const security::member_rights of_vehicle{.may = rights{"bind *:cles", "bind *:state", "push *:join"},
+                                         .offers = rights{"bind *:cles", "bind *:state", "bind *:localization",
+                                                          "push *:join", "push *:leave", "push *:split"}};
 const security::member_rights of_operator{.may = rights{"bind *:cles", "bind *:state", "push *:leave", "push *:split"},
                                           .offers = rights{}};
 

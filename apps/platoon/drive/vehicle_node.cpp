@@ -106,6 +106,8 @@ vehicle_node::vehicle_node(vehicle_options options)
     };
     service_.on_bind("state", {.description = "Its mode, position, speed and acceleration",
                                .must_be_signed = !options_.keys.empty()});
+    service_.on_bind("localization", {.description = "Its position, speed and acceleration alone",
+                                      .must_be_signed = !options_.keys.empty()});
     service_.on_push("join",
                      [this](const join_request& who) {
                          const auto refused = vehicle_.accept_follower(who, now());
@@ -164,7 +166,7 @@ vehicle_report vehicle_node::run() {
 
 asio::awaitable<known_vehicles> vehicle_node::listen() {
     known_vehicles heard;
-    auto feed = co_await service_.async_bind<localization>("all:state");
+    auto feed = co_await service_.async_bind<state_message>("all:state");
     asio::steady_timer enough{io_,
                               300ms + std::chrono::milliseconds{static_cast<int>(3000 / options_.setup.driving.hz)}};
     enough.async_wait([&feed](boost::system::error_code failed) {
@@ -209,7 +211,9 @@ asio::awaitable<void> vehicle_node::join() {
         const auto last = merges ? options_.behind : last_vehicle(heard);
         std::optional<cles::error> refused;
         try {
-            co_await service_.async_push(last + ":join", self);
+            if (heard.at(last).tells_lead) { // others cannot be asked
+                co_await service_.async_push(last + ":join", self);
+            }
         } catch (const cles::error& e) {
             refused = e;
         }
@@ -238,9 +242,10 @@ asio::awaitable<void> vehicle_node::drive() {
     }
 }
 
-void vehicle_node::publish(localization told) {
+void vehicle_node::publish(state_message told) {
     told.sent_ns = monotonic_ns();
     service_.update("state", told);
+    service_.update("localization", localization_of(told));
     for (const auto& name : vehicle_.bound_to()) {
         keep(bound_, name, &vehicle_node::hear);
     }
@@ -264,13 +269,13 @@ void vehicle_node::keep(std::set<std::string>& open, const std::string& name,
 }
 
 asio::awaitable<void> vehicle_node::hear(std::string name) {
-    auto feed = co_await service_.async_bind<localization>(name + ":state", cles::bind_options{}.multicast());
+    auto feed = co_await service_.async_bind<state_message>(name + ":state", cles::bind_options{}.multicast());
     bool first = true; // may be an older one, repeated for this binder
     while (vehicle_.is_bound_to(name)) {
         const auto item = co_await feed.async_next();
         if (item.has_value()) {
-            if (vehicle_.receive(name, item.value, now(), first)) {
-                vehicle_.note_latency(static_cast<double>(monotonic_ns() - item.value.sent_ns) * 1e-3);
+            if (vehicle_.receive(name, item.value, now(), first) && item.value.sent_ns) {
+                vehicle_.note_latency(static_cast<double>(monotonic_ns() - *item.value.sent_ns) * 1e-3);
             }
             first = false;
         } else if (item.kind == cles::feed_event::gap) {
@@ -280,7 +285,7 @@ asio::awaitable<void> vehicle_node::hear(std::string name) {
 }
 
 asio::awaitable<void> vehicle_node::watch(std::string name) {
-    auto feed = co_await service_.async_bind<localization>(
+    auto feed = co_await service_.async_bind<state_message>(
         name + ":state", cles::bind_options{}.at(exchange_url(options_.exchange, name), name));
     while (vehicle_.seen() == name) {
         const auto item = co_await feed.async_next();

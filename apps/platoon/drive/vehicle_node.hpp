@@ -38,8 +38,8 @@ struct vehicle_options {
 /// A vehicle on the road: the service that connects a `vehicle` with the others. It is bound by multicast to those
 /// that it needs, and publishes its own state `hz` times per second.
 ///
-/// Tasks: BIND `state`, whose updates are signed if it has a key; PUSH `join` announces a follower, PUSH `leave` makes
-/// it leave, PUSH `split` makes it the leader of those behind it.
+/// Tasks: BIND `state` and `localization`, whose updates are signed if it has a key; PUSH `join` announces a follower,
+/// PUSH `leave` makes it leave, PUSH `split` makes it the leader of those behind it.
 class vehicle_node {
   public:
     explicit vehicle_node(vehicle_options options);
@@ -54,7 +54,7 @@ class vehicle_node {
     boost::asio::awaitable<known_vehicles> listen();
     boost::asio::awaitable<void> hear(std::string name);
     boost::asio::awaitable<void> watch(std::string name);
-    void publish(localization told);
+    void publish(state_message told);
     void keep(std::set<std::string>& open, const std::string& name,
               boost::asio::awaitable<void> (vehicle_node::*feed)(std::string));
     void end();

@@ -75,7 +75,7 @@ class platoon_watch {
     [[nodiscard]] double now() const { return static_cast<double>(monotonic_ns() - start_ns_) * 1e-9; }
 
     asio::awaitable<void> hear() {
-        auto feed = co_await service_.async_bind<localization>("all:state");
+        auto feed = co_await service_.async_bind<state_message>("all:state");
         for (;;) {
             const auto item = co_await feed.async_next();
             if (!item.has_value()) {

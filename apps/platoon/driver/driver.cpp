@@ -38,6 +38,10 @@ constexpr double radar_gain = 0.4;       // 1/s
 constexpr double switch_time = 1;        // s, from the law for constant spacing to the one for a time gap
 constexpr double trust_after = 2; // s without a gap in the updates, after which the distance becomes smaller again
 
+// Behind a vehicle that does not tell its leader.
+constexpr double lone_time_gap = 1;   // s
+constexpr double averaging_time = 20; // s, of the distance of the one ahead to its leader
+
 // A merge.
 constexpr double merge_timeout = 60;  // s, for the vehicle that joins
 constexpr double in_lane_notice = 2;  // s, for which it is still named when it is in the lane
@@ -121,7 +125,7 @@ void driver::split() {
 }
 
 void driver::measure(const echo& seen, double now) {
-    const double distance = seen.range + setup_.limits.length;
+    const double distance = seen.range + length_ahead();
     if (heard(ahead_) == nullptr && mode_ == role::follow && std::abs(distance - distance_) > distance_tolerance) {
         distance_ = std::max(distance, setup_.spacing); // it does not know yet which one is desired
     }
@@ -158,7 +162,7 @@ void driver::receive(const std::string& from, const state& heard_now, double now
     refuted_ = false;
     beyond_ = who.last().lead == ahead_ ? "" : who.last().ahead;
     makes_room_for_ = mode_ == role::merge || who.last().admits == setup_.name ? "" : who.last().admits;
-    if (!opens_since_) { // else it leads, until it rejoins
+    if (!opens_since_ && !knows_no_leader()) { // else it leads, until it rejoins
         choose_leader(who.last());
     }
     const auto* beyond = heard(beyond_);
@@ -194,11 +198,26 @@ void driver::take_over(const state& from) {
 }
 
 void driver::choose_leader(const state& of_ahead) {
-    if (lead_ != of_ahead.lead) {
-        lead_ = of_ahead.lead;
+    const auto& leader = of_ahead.tells_lead ? of_ahead.lead : setup_.leader;
+    if (lead_ != leader) {
+        lead_ = leader;
         weight_ = mode_ == role::follow && now_ - began_ < start_timeout ? 1 : 0;
     }
-    behind_ = distance_ + of_ahead.behind;
+    behind_ = distance_ + ahead_behind_leader(of_ahead);
+}
+
+// On average, because its errors are not the distance that it wants to keep.
+double driver::ahead_behind_leader(const state& of_ahead) {
+    if (of_ahead.tells_lead) {
+        return of_ahead.behind;
+    }
+    const auto* leader = heard(lead_);
+    if (leader == nullptr || lead_ == ahead_) {
+        return 0;
+    }
+    const double measured = leader->at(now_).x - heard(ahead_)->at(now_).x;
+    apart_ = apart_.value_or(measured) + (measured - apart_.value_or(measured)) / (setup_.hz * averaging_time);
+    return *apart_;
 }
 
 void driver::step(double now) {
@@ -215,7 +234,9 @@ void driver::step(double now) {
     if (mode_ == role::lead) {
         lead(dt);
     } else if (!silent(ahead_) && !keeps_off()) {
-        if (heard(ahead_) != nullptr) {
+        if (heard(ahead_) != nullptr && knows_no_leader()) {
+            follow_alone(dt);
+        } else if (heard(ahead_) != nullptr) {
             follow(dt);
         }
     } else if (mode_ == role::merge) { // in a lane of its own
@@ -246,7 +267,7 @@ void driver::heed_radar(const reference& ahead) {
     }
     auto seen = radar_.at(now_);
     if (seen.v < ahead.where.v - slower_by) {
-        seen.x += setup_.limits.length;
+        seen.x += length_ahead();
         const reference truth{.where = seen, .command = seen.a, .distance = distance_};
         command_ = std::min(command_, spacing_law(setup_.law, self_, truth, 0, 0));
     }
@@ -266,7 +287,7 @@ void driver::lead(double dt) {
     command_ = cruise_ ? std::clamp(cruise_gain * (*cruise_ - self_.v), -cruise_limit, cruise_limit)
                        : setup_.plan.command(now_);
     if (radar_.sees(now_)) {
-        command_ = std::min(command_, keep_time_gap(full_time_gap, radar_.at(now_).a, dt));
+        command_ = std::min(command_, keep_time_gap(radar_.at(now_), full_time_gap, radar_.at(now_).a, dt));
     } else {
         time_gap_.reset();
     }
@@ -300,6 +321,28 @@ void driver::follow(double dt) {
     const auto ahead = reference_to(ahead_, distance_);
     command_ = law(ahead);
     heed_radar(ahead);
+}
+
+// The one ahead tells no leader, and nobody else does.
+bool driver::knows_no_leader() const {
+    const auto* who = heard(ahead_);
+    return setup_.uses_leader && mode_ != role::merge && who != nullptr && !who->last().tells_lead &&
+           setup_.leader.empty();
+}
+
+// Without a leader, errors would grow along the platoon at a constant distance.
+void driver::follow_alone(double dt) {
+    if (mode_ != role::degraded) {
+        time_gap_.reset();
+    }
+    opens_since_.reset();
+    lead_those_behind();
+    enter(role::degraded, ahead_ + " ahead tells no leader: it keeps a time gap");
+    auto rear = heard(ahead_)->at(now_);
+    rear.x -= length_ahead();
+    command_ = keep_time_gap(rear, lone_time_gap, rear.a, dt);
+    distance_ = length_ahead() + kept_gap();
+    heed_radar(reference_to(ahead_, distance_));
 }
 
 void driver::fade(bool leader_counts, double dt) {
@@ -359,7 +402,7 @@ void driver::infer_ahead() {
     const auto where = ahead->at(now_);
     if (radar_.sees(now_)) {
         const auto seen = radar_.at(now_);
-        refuted_ = refuted_ || std::abs(seen.x + setup_.limits.length - where.x) > refuting_error ||
+        refuted_ = refuted_ || std::abs(seen.x + length_ahead() - where.x) > refuting_error ||
                    std::abs(seen.v - where.v) > refuting_speed;
     }
     const auto what = reference_to(beyond_, *to_beyond_);
@@ -373,8 +416,16 @@ void driver::infer_ahead() {
 
 double driver::wanted() const {
     const auto* who = heard(ahead_);
-    return who == nullptr ? setup_.spacing
-                          : wanted_distance(setup_.spacing, setup_.plan.speed, setup_.limits.brake, who->last().brake);
+    if (who == nullptr) {
+        return setup_.spacing;
+    }
+    const double spacing = setup_.spacing + who->last().length - usual_length;
+    return wanted_distance(spacing, setup_.plan.speed, setup_.limits.brake, who->last().brake);
+}
+
+double driver::length_ahead() const {
+    const auto* who = heard(ahead_);
+    return who == nullptr ? usual_length : who->last().length;
 }
 
 void driver::adjust_distance(double dt) {
@@ -420,7 +471,7 @@ void driver::follow_by_radar(double dt) {
     fade(setup_.uses_leader && lead_ != ahead_ && !silent(lead_) && heard(lead_) != nullptr, dt);
     // At first as before, because most interruptions are short, and an update that has just become old is more exact.
     auto seen = radar_.at(now_);
-    seen.x += setup_.limits.length;
+    seen.x += length_ahead();
     reference ahead{.where = seen, .command = seen.a, .distance = distance_};
     if (who != nullptr) {
         // What was inferred counts in full, but once the radar has refuted it, as little as if nothing had been.
@@ -441,19 +492,19 @@ void driver::follow_by_radar(double dt) {
 void driver::open_gap(double acceleration_ahead, double dt) {
     lead_those_behind();
     const double share = std::min(1.0, (now_ - *opens_since_) / switch_time);
-    command_ += share * (keep_time_gap(full_time_gap * link_.gap_share(), acceleration_ahead, dt) - command_);
-    distance_ += share * (setup_.limits.length + kept_gap() - distance_);
+    command_ +=
+        share * (keep_time_gap(radar_.at(now_), full_time_gap * link_.gap_share(), acceleration_ahead, dt) - command_);
+    distance_ += share * (length_ahead() + kept_gap() - distance_);
 }
 
-/// What it keeps by radar, at its present time gap; behind a poor link, never less than it would otherwise.
+/// What it keeps at its present time gap; behind a poor link, never less than it would otherwise.
 double driver::kept_gap() const {
-    const double least = mode_ == role::lead ? standstill_gap : wanted() - setup_.limits.length;
+    const double least = mode_ == role::lead ? standstill_gap : wanted() - length_ahead();
     return std::max(least, standstill_gap + *time_gap_ * self_.v);
 }
 
 /// \param most s: up to this time gap it opens; a larger one stays as it is
-double driver::keep_time_gap(double most, double acceleration_ahead, double dt) {
-    const auto rear = radar_.at(now_);
+double driver::keep_time_gap(const motion& rear, double most, double acceleration_ahead, double dt) {
     const double gap = rear.x - self_.x;
     const double pace = std::max(self_.v, standstill_gap);
     if (!time_gap_) {
@@ -511,7 +562,8 @@ state driver::report() const {
             .j = trend_,
             .from_leader = from_leader_ ? std::optional{std::clamp(*from_leader_, -most, most)} : std::nullopt,
             .lag = platoon_lag,
-            .brake = setup_.limits.brake};
+            .brake = setup_.limits.brake,
+            .length = setup_.limits.length};
 }
 
 } // namespace platoon

@@ -19,10 +19,11 @@ namespace platoon {
 struct driver_setup {
     std::string name{};
     std::string ahead{};  ///< the vehicle it follows; empty: it leads
+    std::string leader{}; ///< its leader, if the one ahead does not tell; empty: unknown then
     bool merges = false;  ///< it is in the next lane, and changes into the lane of the one ahead when there is a gap
     std::string before{}; ///< if it merges: the vehicle that makes room behind it; empty: nobody follows the one ahead
     double hz = 25;       ///< of updates, the same for all
-    double spacing = 15;  ///< m, from front to front
+    double spacing = 15;  ///< m, from front to front, behind a vehicle of the usual length
     bool uses_leader = true; ///< false: follows only the one ahead, for comparison
     motion start{};
     manoeuvre plan{}; ///< if it leads
@@ -82,6 +83,8 @@ class driver {
     void enter(role mode, const std::string& why);
     void lead(double dt);
     void follow(double dt);
+    [[nodiscard]] bool knows_no_leader() const;
+    void follow_alone(double dt);
     void follow_by_radar(double dt);
     void fall_back(double dt);
     void fade(bool leader_counts, double dt);
@@ -95,7 +98,7 @@ class driver {
     [[nodiscard]] bool reports_leader(const std::string& name) const;
     [[nodiscard]] bool drops(const std::string& from, const state& told, double now);
     [[nodiscard]] bool may_infer(const state& ahead, const state& beyond) const;
-    [[nodiscard]] double keep_time_gap(double most, double acceleration_ahead, double dt);
+    [[nodiscard]] double keep_time_gap(const motion& rear, double most, double acceleration_ahead, double dt);
     void open_gap(double acceleration_ahead, double dt);
     [[nodiscard]] double kept_gap() const;
     void rejoin();
@@ -105,6 +108,8 @@ class driver {
     void measure_distance(const track& ahead, double now);
     [[nodiscard]] bool has_room() const;
     [[nodiscard]] double wanted() const;
+    [[nodiscard]] double length_ahead() const;
+    [[nodiscard]] double ahead_behind_leader(const state& of_ahead);
     void adjust_distance(double dt);
     void take_over(const state& from);
     void choose_leader(const state& of_ahead);
@@ -126,6 +131,7 @@ class driver {
     std::string makes_room_for_;        ///< the vehicle that merges ahead of this one
     double distance_;                   ///< desired distance to the one ahead, which slowly approaches `wanted`
     double behind_ = 0;                 ///< desired distance to the leader
+    std::optional<double> apart_;       ///< distance of the one ahead to the leader, if it does not tell, on average
     double weight_ = 0;                 ///< of the leader
     double doubt_ = 0;                  ///< s, for which it has not counted
     std::optional<double> from_leader_; ///< its term in the law, if it has one

@@ -16,6 +16,9 @@ struct vehicle_limits {
     double accelerate = 2.5; ///< m/s²
 };
 
+/// The length of a vehicle that does not state its own, for which spacings are meant, m.
+inline constexpr double usual_length = vehicle_limits{}.length;
+
 /// The lag of the platoon: all vehicles respond with it to what their controllers command, whatever their own lag is.
 inline constexpr double platoon_lag = vehicle_limits{}.lag;
 

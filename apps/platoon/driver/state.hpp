@@ -30,11 +30,12 @@ BOOST_DESCRIBE_ENUM(role, lead, follow, degraded, radar, fallback, merge, leave)
 /// next predecessor when the one ahead leaves.
 struct state {
     role mode = role::follow;
-    std::string ahead{};  ///< the vehicle it follows; empty: none
-    std::string lead{};   ///< its leader; its own name if it leads
-    std::string admits{}; ///< the vehicle that joins between this one and its follower; empty: none
-    double behind = 0;    ///< its desired distance to the leader, m, front to front
-    double t = 0;         ///< s, by the sender's clock: only differences are meaningful to others
+    std::string ahead{};    ///< the vehicle it follows; empty: none
+    std::string lead{};     ///< its leader; its own name if it leads
+    bool tells_lead = true; ///< false: it says neither who leads it nor how far ahead that is
+    std::string admits{};   ///< the vehicle that joins between this one and its follower; empty: none
+    double behind = 0;      ///< its desired distance to the leader, m, front to front
+    double t = 0;           ///< s, by the sender's clock: only differences are meaningful to others
     double x = 0, v = 0, a = 0;
     /// The commanded acceleration from now on, as far as its actuators can, m/s², and how it changes, m/s³.
     double u = 0, j = 0;
@@ -42,6 +43,7 @@ struct state {
     /// leader. Empty if it has none.
     std::optional<double> from_leader{};
     double lag = vehicle_limits{}.lag, brake = vehicle_limits{}.brake; ///< s, with which `a` follows `u`, and m/s²
+    double length = vehicle_limits{}.length;                           ///< m
     std::int64_t sent_ns = 0; ///< CLOCK_MONOTONIC, for measuring on one machine; not used to drive
 
     [[nodiscard]] motion position() const noexcept { return {x, v, a}; }

@@ -47,7 +47,7 @@ void vehicle::begin(const driver_setup& driving, double now) {
 
 double vehicle::next() const noexcept { return first_ + pace_ * static_cast<double>(count_); }
 
-std::optional<localization> vehicle::decide() {
+std::optional<state_message> vehicle::decide() {
     const double at = next();
     const auto count = count_++;
     if (count % echoes_ == 0) {
@@ -58,7 +58,7 @@ std::optional<localization> vehicle::decide() {
         return std::nullopt;
     }
     ++report_.sent;
-    return to_localization(driver_->report(), setup_.start_utc);
+    return reduced(to_message(driver_->report(), setup_.start_utc), setup_.tells);
 }
 
 void vehicle::measure(double at) {
@@ -79,7 +79,7 @@ void vehicle::measure(double at) {
     // As the observer of the drive assumes it.
     const auto there = ended ? without_driver(ahead, at) : advance(ahead.position(), ahead.u, ahead.lag, age);
     const auto self = advance(driver_->position(), driver_->command(), driver_->limits().lag, at - driver_->now());
-    const echo exact{.range = there.x - driver_->limits().length - self.x, .rate = there.v - self.v};
+    const echo exact{.range = there.x - ahead.length - self.x, .rate = there.v - self.v};
     if (const auto seen = sensor_.measure(exact)) {
         driver_->measure(*seen, at);
     }
@@ -97,7 +97,7 @@ bool vehicle::is_bound_to(const std::string& name) const {
     return (driver_ && driver_->needs(name)) || (!setup_.separate_truth && name == seen_);
 }
 
-bool vehicle::receive(const std::string& from, const localization& told, double now, bool repeated) {
+bool vehicle::receive(const std::string& from, const state_message& told, double now, bool repeated) {
     const auto heard = to_state(told, setup_.start_utc);
     const bool counts = !repeated && heard.t >= 0; // updates are exchanged before the drive starts, too
     report_.received += counts ? 1 : 0;
@@ -112,7 +112,7 @@ bool vehicle::receive(const std::string& from, const localization& told, double 
 
 void vehicle::note_gap(std::uint64_t missed, double now) { report_.missed += now >= 0 ? missed : 0; }
 
-void vehicle::see(const std::string& which, const localization& told) {
+void vehicle::see(const std::string& which, const state_message& told) {
     auto heard = to_state(told, setup_.start_utc);
     if (implausible(heard, setup_.driving.law).empty()) {
         truth_[which] = std::move(heard);

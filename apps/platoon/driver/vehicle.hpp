@@ -22,6 +22,7 @@ struct vehicle_setup {
     std::size_t turn = 0, turns = 1; ///< the slot of each period in which it sends
     double start_utc = 0;            ///< UTC at the local time 0, s since 1970
     std::uint64_t seed = 1;          ///< of its radar
+    dialect tells = dialect::current;
     bool separate_truth = false;     ///< what its radar sees comes by another link than the updates that it drives by
 };
 
@@ -48,7 +49,7 @@ class vehicle {
     /// When it decides next. \pre it has begun
     [[nodiscard]] double next() const noexcept;
     /// Measures and decides, and returns its update, if it is time for one. \pre it has begun
-    std::optional<localization> decide();
+    std::optional<state_message> decide();
     /// Whether it has left the platoon.
     [[nodiscard]] bool has_left(double now) const noexcept { return left_at_ && now >= *left_at_; }
 
@@ -60,11 +61,11 @@ class vehicle {
     [[nodiscard]] const std::string& seen() const noexcept { return seen_; }
     /// An update has arrived in the group. \param repeated it was sent again for this vehicle's BIND, and may be older
     /// \return whether it was sent during the drive, and so counts
-    bool receive(const std::string& from, const localization& told, double now, bool repeated);
+    bool receive(const std::string& from, const state_message& told, double now, bool repeated);
     /// The node reports that updates in the group are missing.
     void note_gap(std::uint64_t missed, double now);
     /// An update that no fault has affected.
-    void see(const std::string& which, const localization& told);
+    void see(const std::string& which, const state_message& told);
     /// How long an update has taken.
     void note_latency(double microseconds);
 

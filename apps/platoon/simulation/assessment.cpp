@@ -50,11 +50,11 @@ std::vector<double> spacing_errors(const std::vector<motion>& where, double spac
     return errors;
 }
 
-double least_gap(std::vector<motion> where, double length) {
-    std::sort(where.begin(), where.end(), [](const motion& a, const motion& b) { return a.x > b.x; });
+double least_gap(std::vector<placed> where) {
+    std::sort(where.begin(), where.end(), [](const placed& a, const placed& b) { return a.x > b.x; });
     double least = NAN;
     for (std::size_t i = 1; i < where.size(); ++i) {
-        least = std::fmin(least, where[i - 1].x - where[i].x - length);
+        least = std::fmin(least, where[i - 1].x - where[i - 1].length - where[i].x);
     }
     return least;
 }
@@ -81,7 +81,8 @@ void assessment::sample(const std::vector<motion>& where) {
     sample(where, std::vector<double>(where.size(), spacing_));
 }
 
-void assessment::sample(const std::vector<motion>& where, const std::vector<double>& desired) {
+void assessment::sample(const std::vector<motion>& where, const std::vector<double>& desired,
+                        const std::vector<double>& lengths) {
     const bool complete = where.size() == result_.error.size() + 1;
     result_.string_ratio = complete ? 0 : result_.string_ratio;
     result_.stands = complete ? false : result_.stands;
@@ -94,10 +95,10 @@ void assessment::sample(const std::vector<motion>& where, const std::vector<doub
     result_.acceleration_ratio = of_leader_ >= least_acceleration ? of_others_ / of_leader_ : NAN;
     for (std::size_t i = 0; i + 1 < where.size(); ++i) {
         const double distance = where[i].x - where[i + 1].x;
-        result_.least_gap = std::fmin(result_.least_gap, distance - length_);
+        const double gap = distance - (lengths.empty() ? length_ : lengths[i]);
+        result_.least_gap = std::fmin(result_.least_gap, gap);
         if (const double closing = where[i + 1].v - where[i].v; closing > 0) {
-            result_.least_time_to_collision =
-                std::fmin(result_.least_time_to_collision, std::max(0.0, distance - length_) / closing);
+            result_.least_time_to_collision = std::fmin(result_.least_time_to_collision, std::max(0.0, gap) / closing);
         }
         if (!complete) {
             continue;

@@ -65,7 +65,9 @@ class assessment {
     void sample(const std::vector<motion>& where);
     /// The same with a desired distance of each, of which the leader's does not count. If vehicles have joined or left,
     /// only the gaps between those in the lane count.
-    void sample(const std::vector<motion>& where, const std::vector<double>& desired);
+    /// \param lengths of each; empty: all as given at the start
+    void sample(const std::vector<motion>& where, const std::vector<double>& desired,
+                const std::vector<double>& lengths = {});
     /// From now on, samples belong to the second half of the manoeuvre.
     void begin_recovery() noexcept { recovering_ = true; }
     /// Measures the amplitudes at the frequency of a sine, of which this is the phase. Whole periods have to be
@@ -97,8 +99,12 @@ class assessment {
     spectrum sine_{};
 };
 
+/// The front of a vehicle, and its length, m.
+struct placed {
+    double x = 0, length = 0;
+};
 /// The smallest gap between two successive vehicles, from bumper to bumper; NaN if there are not two.
-double least_gap(std::vector<motion> where, double length);
+double least_gap(std::vector<placed> where);
 
 /// The actual distance minus the desired one, of each vehicle but the first.
 std::vector<double> spacing_errors(const std::vector<motion>& where, double spacing);

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <queue>
+#include <utility>
 
 namespace platoon {
 
@@ -35,6 +36,17 @@ std::vector<motion> start_positions(const std::vector<vehicle_limits>& vehicles,
         all.push_back({.x = i == 0 ? 0 : all.back().x - distance, .v = speed, .a = 0});
     }
     return all;
+}
+
+dialect dialect_of(const scenario& what, std::size_t i) {
+    return i < what.dialects.size() ? what.dialects[i] : dialect::current;
+}
+
+driver_setup setup_of(const scenario& what, std::size_t i) {
+    auto setup = what.setup;
+    setup.ahead = i == 0 ? "" : name_of(i - 1);
+    setup.leader = i == 0 || !what.leader_known ? "" : name_of(0);
+    return setup;
 }
 
 namespace {
@@ -72,8 +84,7 @@ class simulated_platoon {
         const auto limits = limits_of(what.vehicles, what.differences, what.setup.limits, what.seed);
         const auto starts = start_positions(limits, what.setup.spacing, what.setup.plan.speed);
         for (std::size_t i = 0; i < what.vehicles; ++i) {
-            auto setup = what.setup;
-            setup.ahead = i == 0 ? "" : name_of(i - 1);
+            auto setup = setup_of(what, i);
             setup.limits = limits[i];
             setup.start = starts[i];
             const double first = send_offset(i, what.vehicles, setup.hz);
@@ -199,14 +210,18 @@ class simulated_platoon {
         }
         const auto self = truth(i, now);
         const auto ahead = truth(*(place - 1), now);
-        const echo exact{.range = ahead.x - what_.setup.limits.length - self.x, .rate = ahead.v - self.v};
+        const echo exact{.range = ahead.x - all_[*(place - 1)].who.limits().length - self.x, .rate = ahead.v - self.v};
         if (const auto seen = all_[i].sensor.measure(exact)) {
             all_[i].who.measure(*seen, now);
         }
     }
 
     void send(std::size_t from, double now) {
-        const auto said = std::make_shared<const state>(all_[from].who.report());
+        auto told = all_[from].who.report();
+        if (const auto how = dialect_of(what_, from); how != dialect::current) {
+            told = to_state(reduced(to_message(told, 0), how), 0);
+        }
+        const auto said = std::make_shared<const state>(std::move(told));
         for (std::size_t i = 0; i < all_.size(); ++i) {
             if (!all_[i].who.needs(all_[from].name)) {
                 continue;
@@ -221,15 +236,17 @@ class simulated_platoon {
     void look(double now, const Watch& watch) {
         std::vector<motion> where;
         std::vector<double> desired;
+        std::vector<double> lengths;
         for (const auto i : lane_) {
             where.push_back(truth(i, now));
             desired.push_back(all_[i].who.desired_distance());
+            lengths.push_back(all_[i].who.limits().length);
         }
         const auto& plan = what_.setup.plan;
         if (now >= plan.recovery()) {
             result_.begin_recovery();
         }
-        result_.sample(where, desired);
+        result_.sample(where, desired, lengths);
         if (plan.period > 0 && now >= plan.periodic_from() && now < plan.end()) {
             result_.correlate(plan.phase(now), where, desired);
         }

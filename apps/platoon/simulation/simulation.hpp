@@ -2,6 +2,7 @@
 #pragma once
 
 #include "platoon/driver/driver.hpp"
+#include "platoon/driver/localization.hpp"
 #include "platoon/driver/pace.hpp"
 #include "platoon/simulation/assessment.hpp"
 #include "platoon/simulation/impairment.hpp"
@@ -38,9 +39,16 @@ struct scenario {
     std::vector<incident> incidents{};
     spread differences{};
     driver_setup setup{}; ///< of each vehicle, without name, position and predecessor
+    std::vector<dialect> dialects{}; ///< what each vehicle tells; those that are missing: everything
+    bool leader_known = true;        ///< those behind a vehicle that does not tell its leader know it
     /// Called when a vehicle changes its mode.
     std::function<void(double now, const std::string& vehicle, role mode, const std::string& why)> on_change{};
 };
+
+/// What vehicle i tells.
+dialect dialect_of(const scenario& what, std::size_t i);
+/// The setup of vehicle i, apart from its name and its limits.
+driver_setup setup_of(const scenario& what, std::size_t i);
 
 /// A vehicle at a moment of the simulation.
 struct sighting {

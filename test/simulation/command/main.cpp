@@ -224,6 +224,8 @@ struct platoon_options {
     double loss_percent = 0, burst = 0, delay_ms = 0;
     std::vector<double> lags{}, brakes{};
     bool json = false, no_radar = false;
+    std::vector<std::size_t> minimum{}, older{};
+    bool leader_unknown = false;
     platoon::scenario what{};
 };
 
@@ -245,6 +247,14 @@ int drive_platoon(const platoon_options& o) {
         what.differences.least_brake = o.brakes.front();
         what.differences.most_brake = o.brakes.back();
     }
+    what.dialects.resize(what.vehicles);
+    for (const auto each : o.older) {
+        what.dialects.at(each) = platoon::dialect::older;
+    }
+    for (const auto each : o.minimum) {
+        what.dialects.at(each) = platoon::dialect::minimum;
+    }
+    what.leader_known = !o.leader_unknown;
     what.seed = o.seeds.first;
     auto all = platoon::outcome_of(what);
     std::uint64_t broken = 0;
@@ -291,6 +301,9 @@ void add_platoon(CLI::App& to, platoon_options& o) {
     to.add_option("--lags", o.lags, "Engines and brakes lag by LOW to HIGH seconds")->expected(2);
     to.add_option("--brakes", o.brakes, "Vehicles brake with at most LOW to HIGH m/s²")->expected(2);
     to.add_option("--brake-at", o.what.setup.plan.brake_at, "The leader brakes at this time, s");
+    to.add_option("--minimum", o.minimum, "These vehicles tell only the paper's minimum")->delimiter(',');
+    to.add_option("--older", o.older, "These vehicles tell what older ones do")->delimiter(',');
+    to.add_flag("--leader-unknown", o.leader_unknown, "Those behind them do not know the leader");
     to.add_flag("--no-radar", o.no_radar, "Vehicles have no radar");
     to.add_flag("--json", o.json, "Print the results of all drives as JSON");
 }
