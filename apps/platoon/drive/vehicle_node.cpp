@@ -6,6 +6,7 @@
 #include "platoon/simulation/simulation.hpp"
 
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/detached.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/describe/enum_to_string.hpp>
@@ -31,6 +32,7 @@ using steady = std::chrono::steady_clock;
 namespace {
 
 constexpr double join_timeout = 10; // s
+constexpr auto clock_deadline = 500ms;
 
 std::string reason_of(const std::exception_ptr& failure) {
     try {
@@ -124,6 +126,8 @@ vehicle_node::vehicle_node(vehicle_options options)
                          }
                      },
                      {.description = "Lead those behind, at a distance", .parameters = {}, .idempotent = true});
+    service_.on_pull("clock", [this] { return clock_reading{.utc = vehicle_.utc(now())}; },
+                     {.description = "The time by its clock", .parameters = {}, .idempotent = true});
     service_.on_push("leave", [this] { vehicle_.leave(now()); },
                      {.description = "Leave the platoon", .parameters = {}, .idempotent = true});
 }
@@ -249,6 +253,9 @@ void vehicle_node::publish(state_message told) {
     for (const auto& name : vehicle_.bound_to()) {
         keep(bound_, name, &vehicle_node::hear);
     }
+    for (const auto& name : vehicle_.clocks_to_ask(now())) {
+        asio::co_spawn(io_, ask_clock(name), asio::detached);
+    }
     if (!options_.exchange.empty() && !vehicle_.seen().empty()) {
         keep(watched_, vehicle_.seen(), &vehicle_node::watch);
     }
@@ -292,6 +299,18 @@ asio::awaitable<void> vehicle_node::watch(std::string name) {
         if (item.has_value()) {
             vehicle_.see(name, item.value);
         }
+    }
+}
+
+// One that has no such task, or is not known yet, is asked again later.
+asio::awaitable<void> vehicle_node::ask_clock(std::string name) {
+    const double sent = now();
+    try {
+        const auto told =
+            co_await service_.async_pull<clock_reading>(name + ":clock", cles::call_options{}.deadline(clock_deadline));
+        vehicle_.note_clock(name, sent, told.utc, now());
+    } catch (const cles::error&) {
+        co_return;
     }
 }
 

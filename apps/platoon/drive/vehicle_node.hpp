@@ -23,6 +23,12 @@ namespace platoon {
 
 CLES_DEFAULTS(join_request, (merges))
 
+/// The reply of PULL `clock`.
+struct clock_reading {
+    double utc = 0;
+};
+BOOST_DESCRIBE_STRUCT(clock_reading, (), (utc))
+
 struct vehicle_options {
     vehicle_setup setup{};
     bool joins = false;        ///< the platoon that it receives, instead of starting at the position in `setup`
@@ -54,6 +60,7 @@ class vehicle_node {
     boost::asio::awaitable<known_vehicles> listen();
     boost::asio::awaitable<void> hear(std::string name);
     boost::asio::awaitable<void> watch(std::string name);
+    boost::asio::awaitable<void> ask_clock(std::string name);
     void publish(state_message told);
     void keep(std::set<std::string>& open, const std::string& name,
               boost::asio::awaitable<void> (vehicle_node::*feed)(std::string));

@@ -136,7 +136,7 @@ void driver::receive(const std::string& from, const state& heard_now, double now
     if (!needs(from) || drops(from, heard_now, now)) {
         return;
     }
-    bool anew = !tracks_.contains(from) || (lead_ == setup_.name && !opens_since_);
+    bool anew = heard(from) == nullptr || (lead_ == setup_.name && !opens_since_);
     auto& who = tracks_[from];
     const bool is_newer = who.receive(heard_now, now);
     const bool in_lane = who.last().mode != role::merge;
@@ -171,6 +171,8 @@ void driver::receive(const std::string& from, const state& heard_now, double now
         take_over(who.last());
     }
 }
+
+void driver::synchronise(const std::string& with, double difference) { tracks_[with].set_difference(difference); }
 
 void driver::measure_distance(const track& ahead, double now) {
     const double measured = ahead.at(now).x - advance(self_, applied_, setup_.limits.lag, now - now_).x;

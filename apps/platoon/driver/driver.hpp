@@ -49,6 +49,8 @@ class driver {
     /// Processes an update of one of those, and drops it if it is `implausible`. \param now the time of the last
     /// `step`, or a little later
     void receive(const std::string& from, const state& heard, double now);
+    /// The clock of one of those differs by this, local time minus its own, s.
+    void synchronise(const std::string& with, double difference);
     /// Advances to this time with the present command, then computes the next one.
     void step(double now);
     /// Processes what its radar saw. \param now the time of the last `step`, or a little later

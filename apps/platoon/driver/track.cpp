@@ -17,7 +17,7 @@ bool track::receive(const state& heard, double now) {
     if (last_ && !restarted && heard.t <= last_->t) {
         return false; // overtaken by a newer one
     }
-    // The clocks are not synchronised, but the difference shows how much longer an update took than the fastest one.
+    // If nothing is known of the clocks, this shows how much longer an update took than the fastest one.
     const double difference = now - heard.t;
     offset_ = !last_ || restarted ? difference : std::min(difference, offset_ + drift * (now - received_));
     last_ = base_ = heard;
@@ -27,7 +27,7 @@ bool track::receive(const state& heard, double now) {
 
 void track::assume(double command, double now) {
     const auto there = at(now);
-    base_.t = now - offset_;
+    base_.t = now - offset();
     base_.x = there.x;
     base_.v = there.v;
     base_.a = there.a;
@@ -35,7 +35,7 @@ void track::assume(double command, double now) {
     base_.j = 0;
 }
 
-double track::age(double now) const { return std::clamp(now - offset_ - base_.t, 0.0, horizon); }
+double track::age(double now) const { return std::clamp(now - offset() - base_.t, 0.0, horizon); }
 
 double track::command_at(double now) const { return base_.u + base_.j * std::min(age(now), trend_horizon); }
 

@@ -14,6 +14,9 @@ class track {
     /// \param now local time, s
     /// \return false if a newer update has been received before, or this one
     bool receive(const state& heard, double now);
+    /// Its clock differs by this, local time minus its own, s. Before this is known, the fastest update counts as one
+    /// that took no time.
+    void set_difference(double local_minus_its) noexcept { difference_ = local_minus_its; }
     [[nodiscard]] bool known() const noexcept { return last_.has_value(); }
     [[nodiscard]] const state& last() const noexcept { return *last_; }
     /// How long it has been silent, by local time alone.
@@ -27,11 +30,13 @@ class track {
 
   private:
     [[nodiscard]] double age(double now) const;
+    [[nodiscard]] double offset() const { return difference_.value_or(offset_); }
 
     std::optional<state> last_;
     state base_{};        ///< from which its motion is extrapolated: the last update, or what has been assumed since
     double received_ = 0; ///< when the last update arrived
     double offset_ = 0;   ///< local time minus the sender's, for the fastest update
+    std::optional<double> difference_; ///< the same of the clocks, if it was measured
 };
 
 } // namespace platoon

@@ -14,7 +14,10 @@ namespace {
 constexpr double join_interval = 5;              // s in which only one vehicle may join
 constexpr std::size_t max_latencies = 1'000'000; // stored of one drive
 constexpr double process_delay = 0.2;            // s, by which an update may be late if its sender is still there
-constexpr double leave_duration = 1;             // s in which it announces that it leaves
+constexpr std::size_t first_exchanges = 4;       // with the clock of another vehicle, ...
+constexpr double first_interval = 0.2;           // ... which follow each other in this time, s; the others in this one:
+constexpr double exchange_interval = 2;
+constexpr double leave_duration = 1; // s in which it announces that it leaves
 
 } // namespace
 
@@ -111,6 +114,29 @@ bool vehicle::receive(const std::string& from, const state_message& told, double
 }
 
 void vehicle::note_gap(std::uint64_t missed, double now) { report_.missed += now >= 0 ? missed : 0; }
+
+std::set<std::string> vehicle::clocks_to_ask(double now) {
+    std::set<std::string> names;
+    if (!driver_) {
+        return names;
+    }
+    for (const auto& name : driver_->needed()) {
+        auto& one = clocks_[name];
+        if (now >= one.ask_at) {
+            one.ask_at = now + (one.difference.exchanges() < first_exchanges ? first_interval : exchange_interval);
+            names.insert(name);
+        }
+    }
+    return names;
+}
+
+void vehicle::note_clock(const std::string& of, double sent, double utc, double received) {
+    auto& one = clocks_[of].difference;
+    one.add(sent, utc - setup_.start_utc, received);
+    if (driver_) {
+        driver_->synchronise(of, *one.value());
+    }
+}
 
 void vehicle::see(const std::string& which, const state_message& told) {
     auto heard = to_state(told, setup_.start_utc);

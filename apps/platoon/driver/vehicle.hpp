@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "platoon/driver/clock_difference.hpp"
 #include "platoon/driver/driver.hpp"
 #include "platoon/driver/joining.hpp"
 #include "platoon/driver/localization.hpp"
@@ -23,7 +24,7 @@ struct vehicle_setup {
     double start_utc = 0;            ///< UTC at the local time 0, s since 1970
     std::uint64_t seed = 1;          ///< of its radar
     dialect tells = dialect::current;
-    bool separate_truth = false;     ///< what its radar sees comes by another link than the updates that it drives by
+    bool separate_truth = false; ///< what its radar sees comes by another link than the updates that it drives by
 };
 
 /// A vehicle as its node needs it: whose states to bind, what to publish and when, and how to answer requests. Its
@@ -64,6 +65,12 @@ class vehicle {
     bool receive(const std::string& from, const state_message& told, double now, bool repeated);
     /// The node reports that updates in the group are missing.
     void note_gap(std::uint64_t missed, double now);
+    /// Those whose clocks are to be asked for now, by PULL `clock`, each once.
+    std::set<std::string> clocks_to_ask(double now);
+    /// One has answered. \param utc what it said \param sent, received local times
+    void note_clock(const std::string& of, double sent, double utc, double received);
+    /// UTC by its own clock.
+    [[nodiscard]] double utc(double now) const noexcept { return setup_.start_utc + now; }
     /// An update that no fault has affected.
     void see(const std::string& which, const state_message& told);
     /// How long an update has taken.
@@ -85,13 +92,19 @@ class vehicle {
   private:
     void measure(double at);
 
+    struct clock {
+        clock_difference difference{};
+        double ask_at = 0; ///< when next
+    };
+
     vehicle_setup setup_;
     std::int64_t decisions_, echoes_;
     double first_, pace_;    ///< when it would have decided first, and the time between two decisions
     std::int64_t count_ = 0; ///< of its next decision
     radar sensor_;
     std::optional<driver> driver_;
-    std::map<std::string, state> truth_; ///< of each of the others
+    std::map<std::string, state> truth_;  ///< of each of the others
+    std::map<std::string, clock> clocks_; ///< the same
     std::string seen_;
     std::string follower_; ///< the vehicle that joined behind, at `followed_at_`
     double followed_at_ = 0;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "platoon/simulation/simulation.hpp"
 
+#include "platoon/driver/clock_difference.hpp"
 #include "platoon/simulation/link_matrix.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <optional>
 #include <queue>
@@ -51,11 +53,12 @@ driver_setup setup_of(const scenario& what, std::size_t i) {
 
 namespace {
 
-constexpr double leave_duration = 1; // s in which a vehicle announces that it leaves
+constexpr double leave_duration = 1;      // s in which a vehicle announces that it leaves
+constexpr double exchange_interval = 0.5; // s, between two requests for the clock of another vehicle
 
 struct scheduled_event {
     double at = 0;
-    enum { happening, delivery, decision, look } what = look; // in this order at the same time
+    enum { happening, delivery, exchange, decision, look } what = look; // in this order at the same time
     std::size_t vehicle = 0, from = 0;
     unsigned count = 0;
     std::shared_ptr<const state> heard{};
@@ -73,6 +76,7 @@ struct simulated_vehicle {
     double first = 0; ///< when it sends first
     double mute_until = -INFINITY;
     bool vanished = false, left = false;
+    std::map<std::size_t, clock_difference> clocks{}; ///< of the others
 };
 
 class simulated_platoon {
@@ -108,6 +112,7 @@ class simulated_platoon {
             case scheduled_event::delivery:
                 all_[next.vehicle].who.receive(all_[next.from].name, *next.heard, next.at);
                 break;
+            case scheduled_event::exchange: exchange_clocks(next); break;
             case scheduled_event::decision: decide(next); break;
             case scheduled_event::look: look(next.at, watch); break;
             }
@@ -131,6 +136,9 @@ class simulated_platoon {
             };
         }
         schedule_.push({.at = first, .what = scheduled_event::decision, .vehicle = i});
+        if (what_.delay > 0) {
+            schedule_.push({.at = first + exchange_interval, .what = scheduled_event::exchange, .vehicle = i});
+        }
     }
 
     void happen(const scheduled_event& turn) {
@@ -195,6 +203,24 @@ class simulated_platoon {
         next.count += 1;
         next.at = vehicle.first + next.count * period_ / decisions_;
         schedule_.push(next);
+    }
+
+    // With those that it needs. Without delay, it would change nothing, because all clocks are right.
+    void exchange_clocks(const scheduled_event& turn) {
+        auto& vehicle = all_[turn.vehicle];
+        for (std::size_t i = 0; i < all_.size(); ++i) {
+            if (!vehicle.who.needs(all_[i].name)) {
+                continue;
+            }
+            const auto there = requests_.next(turn.vehicle, i);
+            const auto back = requests_.next(i, turn.vehicle);
+            if (there && back) {
+                auto& clock = vehicle.clocks[i];
+                clock.add(turn.at, turn.at + *there, turn.at + *there + *back);
+                vehicle.who.synchronise(all_[i].name, *clock.value());
+            }
+        }
+        schedule_.push({.at = turn.at + exchange_interval, .what = scheduled_event::exchange, .vehicle = turn.vehicle});
     }
 
     void enter_lane(std::size_t i) {
@@ -267,7 +293,7 @@ class simulated_platoon {
     scenario what_;
     double period_;
     unsigned decisions_, echoes_;
-    link_matrix links_;
+    link_matrix links_, requests_; ///< what carries updates, and what carries requests for clocks
     assessment result_;
     std::vector<simulated_vehicle> all_;
     std::vector<std::size_t> lane_; ///< from the front to the rear

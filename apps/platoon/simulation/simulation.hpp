@@ -38,7 +38,7 @@ struct scenario {
     std::uint64_t seed = 1;
     std::vector<incident> incidents{};
     spread differences{};
-    driver_setup setup{}; ///< of each vehicle, without name, position and predecessor
+    driver_setup setup{};            ///< of each vehicle, without name, position and predecessor
     std::vector<dialect> dialects{}; ///< what each vehicle tells; those that are missing: everything
     bool leader_known = true;        ///< those behind a vehicle that does not tell its leader know it
     /// Called when a vehicle changes its mode.
