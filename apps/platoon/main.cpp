@@ -357,8 +357,8 @@ int main(int argc, char** argv) {
     CLI::App app{"A platoon of vehicles that communicate by multicast.", "cles-platoon"};
     app.require_subcommand(1);
     app.footer(
-        "Exit codes: 0 ok, 1 a collision, or a platoon that stood still or fell apart, 2 usage, 3 no vehicle or no "
-        "multicast, 4 the manoeuvre did not end, 5 another error, 6 busy.");
+        "Exit codes: 0 ok, 1 a collision, or a platoon that stood still or fell apart, 2 usage, 3 no vehicle, no "
+        "multicast, or no network namespaces for faults, 4 the manoeuvre did not end, 5 another error, 6 busy.");
     auto& in_time =
         *app.add_subcommand("simulate", "Simulate the control law alone in virtual time: no nodes, no network");
     auto& search = *app.add_subcommand("tune", "Search the gains of the control law, in virtual time");

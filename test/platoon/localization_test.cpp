@@ -44,8 +44,6 @@ std::string replaced(const std::string& before, const std::string& after) {
 
 BOOST_AUTO_TEST_SUITE(localization)
 
-using ::localization::older_message;
-
 BOOST_AUTO_TEST_CASE(utc_and_a_place_on_earth_are_enough_for_a_vehicle) {
     const double start = 1'795'000'000;
     const platoon::state told{.mode = platoon::role::degraded,
@@ -133,11 +131,11 @@ BOOST_AUTO_TEST_CASE(older_vehicles_and_new_ones_read_each_other) {
 }
 
 BOOST_AUTO_TEST_CASE(a_localization_is_the_minimum) {
-    const auto message = to_message({.t = 1, .x = 20, .v = 24, .a = -0.5}, 100);
-    const auto found = localization_of(message);
+    const auto message = platoon::to_message({.t = 1, .x = 20, .v = 24, .a = -0.5}, 100);
+    const auto found = platoon::localization_of(message);
     BOOST_TEST(found.velocity == 24.0);
     BOOST_TEST(found.acceleration == -0.5);
-    const auto heard = to_state(cles::from_json<platoon::state_message>(cles::to_json(found)), 100);
+    const auto heard = platoon::to_state(cles::from_json<platoon::state_message>(cles::to_json(found)), 100);
     BOOST_TEST(std::abs(heard.x - 20) < 1e-6);
     BOOST_TEST(!to_state(reduced(message, platoon::dialect::minimum), 100).tells_lead);
 }

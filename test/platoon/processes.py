@@ -3,6 +3,7 @@
 
 import json
 import os
+import re
 import subprocess
 import time
 import unittest
@@ -65,6 +66,14 @@ def wait_until(condition, what):
             return
         time.sleep(0.02)
     raise AssertionError(f"waited in vain: {what}")
+
+
+def read_until(process, expression):
+    """The first of the next lines that contains it."""
+    for line in process.stdout:
+        if re.search(expression, line):
+            return line
+    raise AssertionError(f"it has ended: {process.stderr.read()}")
 
 
 class DriveTest(unittest.TestCase):

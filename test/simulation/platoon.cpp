@@ -32,8 +32,8 @@ constexpr double head_start = 3;      // s, before the drive, in which nodes fin
 constexpr double time_of_look = 0.01; // s, between two looks at all positions
 constexpr double start_utc = 1'700'000'000;
 
-nanoseconds to_duration(double seconds) {
-    return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>{seconds});
+nanoseconds to_duration(double time) {
+    return std::chrono::duration_cast<nanoseconds>(std::chrono::duration<double>{time});
 }
 
 /// A feed of a vehicle's states in the group, whose events a vehicle gets as they arrive.

@@ -197,9 +197,7 @@ class drive_supervisor {
                     }
                 }
             } catch (const cles::error& e) {
-                if (e.code() != cles::errc::unavailable) {
-                    throw;
-                }
+                unheard_[name] = e.message(); // if it stays so, `wait_for_all` tells
             }
             co_await pause(poll_interval);
         }
@@ -277,8 +275,10 @@ class drive_supervisor {
                 throw cles::error(cles::errc::unavailable, *missing + " did not start: " + last_line(*missing));
             }
             if (now() > process_timeout) {
-                throw cles::error(cles::errc::deadline, *missing + " is not received: check that " +
-                                                            options_.group.interface + " supports multicast");
+                throw cles::error(cles::errc::deadline,
+                                  *missing + " is not received: " +
+                                      (faults_ ? unheard_[*missing]
+                                               : "check that " + options_.group.interface + " supports multicast"));
             }
         }
     }
@@ -534,6 +534,7 @@ class drive_supervisor {
     std::vector<event> events_;
     std::vector<std::string> news_; ///< the same, and changes of modes, in lines
     relay_count relayed_;
+    std::map<std::string, std::string> unheard_; ///< why some could not be bound behind the relay
     std::string foreign_vehicle_;
     std::exception_ptr receive_failure_; ///< why updates are no longer received
     std::int64_t start_ns_ = 0;

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstring>
 #include <string>
+#include <string_view>
 #include <system_error>
 
 #include <arpa/inet.h>
@@ -48,7 +49,7 @@ failure failed(const char* what) {
 
 bool set_address(int socket, const char* device, unsigned long request, std::uint32_t address) {
     ifreq what{};
-    std::strncpy(what.ifr_name, device, sizeof what.ifr_name - 1);
+    std::string_view{device}.copy(what.ifr_name, sizeof what.ifr_name - 1);
     sockaddr_in to{};
     to.sin_family = AF_INET;
     to.sin_addr.s_addr = ::htonl(address);
@@ -58,7 +59,7 @@ bool set_address(int socket, const char* device, unsigned long request, std::uin
 
 bool set_up(int socket, const char* device) {
     ifreq what{};
-    std::strncpy(what.ifr_name, device, sizeof what.ifr_name - 1);
+    std::string_view{device}.copy(what.ifr_name, sizeof what.ifr_name - 1);
     if (::ioctl(socket, SIOCGIFFLAGS, &what) != 0) {
         return false;
     }
@@ -74,7 +75,7 @@ int create_device(unsigned number, failure& why) {
     }
     const int device = ::open("/dev/net/tun", O_RDWR | O_NONBLOCK | O_CLOEXEC);
     ifreq what{};
-    std::strncpy(what.ifr_name, radio_device, sizeof what.ifr_name - 1);
+    std::string_view{radio_device}.copy(what.ifr_name, sizeof what.ifr_name - 1);
     what.ifr_flags = IFF_TUN | IFF_NO_PI;
     if (device < 0 || ::ioctl(device, TUNSETIFF, &what) != 0) {
         why = failed("/dev/net/tun is not available");

@@ -269,7 +269,7 @@ void vehicle_node::keep(std::set<std::string>& open, const std::string& name,
     asio::co_spawn(io_, (this->*feed)(name), [this, &open, name](const std::exception_ptr& failure) {
         open.erase(name); // the next update retries it, if it is still needed
         const auto why = failure ? name + " cannot be received: " + reason_of(failure) : "";
-        if (failure && reported_.insert(why).second) {
+        if (failure && now() >= 0 && reported_.insert(why).second) { // before, it may not have started yet
             vehicle_.note(now(), "unheard", why);
         }
     });

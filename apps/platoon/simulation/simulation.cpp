@@ -53,8 +53,8 @@ driver_setup setup_of(const scenario& what, std::size_t i) {
 
 namespace {
 
-constexpr double leave_duration = 1;      // s in which a vehicle announces that it leaves
-constexpr double exchange_interval = 0.5; // s, between two requests for the clock of another vehicle
+constexpr double announced_for = 1;       // s in which a vehicle announces that it leaves
+constexpr double between_exchanges = 0.5; // s, between two requests for the clock of another vehicle
 
 struct scheduled_event {
     double at = 0;
@@ -84,6 +84,7 @@ class simulated_platoon {
     explicit simulated_platoon(const scenario& what)
         : what_(what), period_(1 / what.setup.hz), decisions_(decisions_per_update(what.setup.hz)),
           echoes_(decisions_per_echo(what.setup.radar, what.setup.hz)), links_(what.losses, what.delay, what.seed),
+          requests_(what.losses, what.delay, what.seed + 500'000'000),
           result_(what.vehicles, what.setup.spacing, what.setup.limits.length) {
         const auto limits = limits_of(what.vehicles, what.differences, what.setup.limits, what.seed);
         const auto starts = start_positions(limits, what.setup.spacing, what.setup.plan.speed);
@@ -137,7 +138,7 @@ class simulated_platoon {
         }
         schedule_.push({.at = first, .what = scheduled_event::decision, .vehicle = i});
         if (what_.delay > 0) {
-            schedule_.push({.at = first + exchange_interval, .what = scheduled_event::exchange, .vehicle = i});
+            schedule_.push({.at = first + between_exchanges, .what = scheduled_event::exchange, .vehicle = i});
         }
     }
 
@@ -151,7 +152,7 @@ class simulated_platoon {
         case incident::leave:
             if (turn.count == 0) {
                 vehicle.who.leave();
-                schedule_.push({turn.at + leave_duration, scheduled_event::happening, turn.vehicle, 0, 1, {}});
+                schedule_.push({turn.at + announced_for, scheduled_event::happening, turn.vehicle, 0, 1, {}});
             } else {
                 vehicle.left = true;
                 std::erase(lane_, what.vehicle);
@@ -220,7 +221,7 @@ class simulated_platoon {
                 vehicle.who.synchronise(all_[i].name, *clock.value());
             }
         }
-        schedule_.push({.at = turn.at + exchange_interval, .what = scheduled_event::exchange, .vehicle = turn.vehicle});
+        schedule_.push({.at = turn.at + between_exchanges, .what = scheduled_event::exchange, .vehicle = turn.vehicle});
     }
 
     void enter_lane(std::size_t i) {
