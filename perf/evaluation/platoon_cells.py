@@ -121,7 +121,7 @@ def main():
                     "target": 0, "reached": collisions == 0},
                    {"name": "least_gap", "what": "the smallest gap of all drives", "unit": "m",
                     "value": min(cell["least_gap"] for cell in cells)}]
-        result_file.write(options.output, {**result, "figures": figures})
+        result_file.write({**result, "figures": figures}, options.output)
     print(f"{collisions} collisions in {drives} drives")
     return 1 if collisions else 0
 

@@ -77,8 +77,8 @@ def main():
     if options.output:
         figures = [{"name": f"{half}_error_gain", "value": max(filter(None, gains["error"])), "unit": "times",
                     "what": f"largest gain of the error from vehicle to vehicle, {half}"} for half, gains in halves.items()]
-        result_file.write(options.output, {"vehicles": options.vehicles, "hz": options.hz, "halves": halves, "sines": sines,
-                                           "figures": figures})
+        result_file.write({"vehicles": options.vehicles, "hz": options.hz, "halves": halves, "sines": sines,
+                           "figures": figures}, options.output)
     return 0
 
 

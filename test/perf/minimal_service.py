@@ -15,8 +15,8 @@ import sys
 from pathlib import Path
 from statistics import median
 
-MAX_SIZE = 1_076_000  # what it has reached, and one page: looking up names side by side, trying several addresses, asking a
-# silent node whether it lives, following the interfaces of the host, and asking for others are in it
+MAX_SIZE = 1_080_000  # what it has reached, and one page: looking up names side by side, trying several addresses, asking a
+# silent node whether it lives, following the interfaces of the host, asking for others, and delivering updates in batches are in it
 MAX_PRIVATE = 1 << 20
 MAX_RESIDENT = 4 << 20
 MAX_OFF = 8_192  # bytes by which the size on the page may differ

@@ -223,7 +223,7 @@ class Strangers(Secured):
         self.vehicle("--keys", f"{folder}/v0", "--lead")
         wait_until(lambda: "v0" in self.cles("ls", "--keys", f"{folder}/operator").stdout, "v0 is there")
         offered = json.loads(self.good("pull", "v0:cles", "--keys", f"{folder}/operator", "-o", "json"))["tasks"]
-        self.assertEqual([task["task"] for task in offered if task.get("signed")], ["state"])
+        self.assertEqual([task["task"] for task in offered if task.get("signed")], ["localization", "state"])
 
 
 class TwoHosts(Secured):

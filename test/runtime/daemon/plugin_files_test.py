@@ -216,10 +216,10 @@ class PluginFiles(unittest.TestCase):
     def test_a_library_that_is_missing_beside_it(self):
         with open(self.plugin, "rb") as file:
             image = file.read()
-        self.assertIn(b"libm.so.6\0", image)
+        self.assertIn(b"libc.so.6\0", image)
         with open(self.plugin, "wb") as file:
-            file.write(image.replace(b"libm.so.6\0", b"libM.so.6\0"))
-        missing = "libM.so.6: cannot open shared object file: No such file or directory"
+            file.write(image.replace(b"libc.so.6\0", b"libC.so.6\0"))
+        missing = "libC.so.6: cannot open shared object file: No such file or directory"
         self.refused(f"it cannot be loaded: {missing} (with 'security' or 'sha256', $ORIGIN in a plugin is not its folder)")
         self.refused(f"it cannot be loaded: {missing}", security=False)
 

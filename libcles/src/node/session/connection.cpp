@@ -340,7 +340,7 @@ void connection::on_stall(time_point now) {
 
 void connection::log_closed(log_level level, std::string_view kind, std::string_view what) {
     const auto& peer = link_->peer();
-    host_->node().log_caused({.level = level, .kind = kind, .source = holder_of(peer), .peer = peer.address},
+    host_->node().log_caused({.level = level, .kind = kind, .source = holder_of(peer), .peer = peer.address, .most = 8},
                              [&] { return std::string{what}.append(": ").append(peer.address); });
 }
 
