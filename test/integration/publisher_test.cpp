@@ -73,12 +73,12 @@ struct counted {
 } // namespace publisher
 
 template <>
-struct cles::converter<publisher::counted> {
+struct cles::converter<::publisher::counted> {
     static constexpr bool is_scalar = true;
-    static void write(json_writer& w, const publisher::counted& value) {
+    static void write(json_writer& w, const ::publisher::counted& value) {
         w.value(static_cast<std::int64_t>(++*value.writes));
     }
-    static bool read(json_reader& r, publisher::counted&) { return r.skip(); }
+    static bool read(json_reader& r, ::publisher::counted&) { return r.skip(); }
 };
 
 BOOST_FIXTURE_TEST_SUITE(publisher, fixture)
