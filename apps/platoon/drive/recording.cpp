@@ -25,12 +25,13 @@ constexpr double budget_us = 100'000;
     throw cles::error(code, "cannot write " + path + ": " + code.message());
 }
 
-// The vehicle at that place at the beginning; without courses, they are numbered from the front.
+// The vehicle at that place when all were first on the lane; without courses, they are numbered from the front.
 std::string one_ahead(const recording& drive, std::ptrdiff_t place) {
     std::vector<std::pair<double, std::string>> order;
     for (const auto& each : drive.courses) {
-        if (!each.place.empty() && !std::isnan(each.place.front())) {
-            order.emplace_back(-each.place.front(), each.vehicle);
+        const auto first = std::find_if(each.place.begin(), each.place.end(), [](double x) { return !std::isnan(x); });
+        if (first != each.place.end()) {
+            order.emplace_back(-*first, each.vehicle);
         }
     }
     std::sort(order.begin(), order.end());
