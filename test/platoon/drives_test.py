@@ -60,7 +60,7 @@ class TwoHosts(unittest.TestCase):
         watcher = self.at(self.hosts.near, "run", "--multicast", "v0", "--insecure", "--vehicles", 2, "--seconds", 60,
                           "--leave", "1@1")
         self.addCleanup(ended, watcher)
-        self.assertRegex(watcher.stdout.readline(), r"\d s  2 vehicles")
+        read_until(watcher, r"\d s  2 vehicles")
         joins = self.at(self.hosts.far, "vehicle", "--join", "--name", "v9", "--multicast", "v1", "--insecure", "--seconds", 3,
                         "--report")
         self.addCleanup(ended, joins)

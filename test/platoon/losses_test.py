@@ -6,7 +6,7 @@ import os
 import signal
 import unittest
 
-from processes import PATIENCE, DriveTest, children_of, ended, free_group, is_running, start, wait_until
+from processes import PATIENCE, DriveTest, children_of, ended, free_group, is_running, read_until, start, wait_until
 
 
 class Killed(DriveTest):
@@ -66,7 +66,7 @@ class Killed(DriveTest):
         watcher = start("run", "--multicast", free_group(), "--vehicles", 2, "--seconds", 60, start_new_session=True)
         self.addCleanup(ended, watcher)
         for _ in range(3):  # after which they have received each other
-            self.assertRegex(watcher.stdout.readline(), r"\d s  2 vehicles")
+            read_until(watcher, r"\d s  2 vehicles")
         vehicles = children_of(watcher.pid)
         os.killpg(watcher.pid, signal.SIGINT)  # as a terminal does
         out, err = watcher.communicate(timeout=PATIENCE)

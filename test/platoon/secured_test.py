@@ -13,7 +13,7 @@ import tempfile
 import threading
 import unittest
 
-from processes import PATIENCE, PLATOON, DriveTest, ended, environment, free_group, run, start, wait_until
+from processes import PATIENCE, PLATOON, DriveTest, ended, environment, free_group, read_until, run, start, wait_until
 from support import CLES
 from two_hosts import Hosts
 
@@ -238,7 +238,7 @@ class TwoHosts(Secured):
         self.addCleanup(self.hosts.close)
         folder = self.fleet("operator", "v0", "v1", "v9")
         watcher = self.at(self.hosts.near, "run", "--multicast", "v0", "--keys", folder, "--vehicles", 2, "--seconds", 60)
-        self.assertRegex(watcher.stdout.readline(), r"\d s  2 vehicles")
+        read_until(watcher, r"\d s  2 vehicles")
         joins = self.at(self.hosts.far, "vehicle", "--keys", f"{folder}/v9", "--multicast", "v1", "--seconds", 3, "--report")
         out, err = joins.communicate(timeout=PATIENCE)
         self.assertEqual(joins.returncode, 0, err)

@@ -50,7 +50,7 @@ class Watching(unittest.TestCase):
         group = free_group()
         watcher = start("run", "--multicast", group, "--vehicles", 2, "--seconds", 20)
         self.addCleanup(ended, watcher)
-        self.assertRegex(watcher.stdout.readline(), r"\d s  2 vehicles")
+        read_until(watcher, r"\d s  2 vehicles")
         joins = start("vehicle", "--name", "v9", "--multicast", group, "--seconds", 60)
         self.addCleanup(ended, joins)
         read_until(watcher, r"\d s  3 vehicles")
