@@ -73,6 +73,8 @@ class StoryTest(unittest.TestCase):
             seen = next(one for one in mission.all("assessed") if one["text"].startswith(f"order {strike['order']} "))
             self.assertGreater(seen["utc"], strike["outcome"]["impact_utc"] - 0.1)
         self.assertEqual(striker.pull("strike1:strike")["orders"], sorted(told["order"] for told in strikes))
+        if PATIENCE <= 30:
+            recon.wait_for("fusion")  # the satellite has a scan a second, and needs some of them
         recon.stop(signal.SIGINT)
         self.assertEqual(recon.end(), 0)
         report = recon.all("report")[0]["data"]
@@ -85,8 +87,8 @@ class StoryTest(unittest.TestCase):
         self.assertGreaterEqual(processed["frames"], frames["done"])
         self.assertLessEqual(processed["frames"], frames["done"] + frames["missing"])
         self.check_found(report)
-        if PATIENCE <= 30 and report["corrected"] == 0:  # the satellite's own plots are fused, unless nearly no target was seen
-            self.assertGreater((frames["skipped"] + frames["missing"]) * 5, frames["captured"], recon.events)
+        if PATIENCE <= 30:
+            self.assertGreater(report["corrected"], 0, recon.events)
 
         # No node knows others than those of its links.
         self.assertLessEqual(satellite.peers(), {"recon-camera"})

@@ -64,7 +64,10 @@ def measured_decision():
 def measured_descent():
     found = {**sample("dsgd"), "quick": False, "threads": 4, "machine": MACHINE}
     others = [each for each in found["figures"] if not each["name"].startswith("lines")]
-    return {**found, "figures": [*others, *dsgd_figures.lines()], "hosts": {**found["hosts"], "not_allowed": ["a quota"]}}
+    pictured = {"of": 4, "box": 1, "classifier": {"weights": [0.1, 0.1], "bias": 0.5},
+                "some": [[-2, -2, 0], [2, 2, 1], [-1, -3, 1]], "near": [[-0.5, -0.5, 0], [0.5, 0.5, 1]]}
+    return {**found, "figures": [*others, *dsgd_figures.lines()], "pictured": pictured,
+            "hosts": {**found["hosts"], "not_allowed": ["a quota"]}}
 
 
 def measured_digits():
