@@ -93,9 +93,10 @@ class feed_batch {
             return verdict::full;
         }
         auto& items = memory_->items;
+        auto& item = items.emplace_back();
         bool is_json = false;
         try {
-            is_json = detail::fill(event, items.emplace_back(), code, why);
+            is_json = detail::fill(event, item, code, why);
         } catch (...) { // of the conversion
             items.pop_back();
             throw;

@@ -315,7 +315,7 @@ void loaded_plugin::run(task_handler handler, void* user, const request& what, c
             }
         });
     }
-    const plugin_turn turn{job};
+    plugin_turn turn{job};
     call_handler(handler, user, what, job);
     jobs_.started(job);
 }

@@ -270,13 +270,13 @@ void plugin_request::complete(boost::system::error_code code, std::string_view j
         }
     } catch (...) { // no memory or no thread: better now than never
     }
-    const plugin_turn turn{job()};
+    plugin_turn turn{job()};
     call_plugin(answered_, user_, abi_text(name), abi_text(result), abi_text(message));
 }
 
 void plugin_request::report_progress(double fraction, std::string_view json) noexcept {
     if (!is_claimed()) {
-        const plugin_turn turn{job()};
+        plugin_turn turn{job()};
         call_plugin(progress_, user_, fraction, abi_text(json));
     }
 }
@@ -298,7 +298,7 @@ void plugin_next::complete(boost::system::error_code code, const job_event& what
                                .waited_ns = what.waited.count(),
                                .epoch = what.epoch,
                                .reserved = 0};
-        const plugin_turn turn{job()};
+        plugin_turn turn{job()};
         call_plugin(event_, user_, cles_text{}, cles_text{}, &event);
         return;
     }
@@ -312,7 +312,7 @@ void plugin_next::complete(boost::system::error_code code, const job_event& what
         }
     } catch (...) { // as above
     }
-    const plugin_turn turn{job()};
+    plugin_turn turn{job()};
     call_plugin(event_, user_, abi_text(name), abi_text(what.text), nullptr);
 }
 
