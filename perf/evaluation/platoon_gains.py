@@ -76,6 +76,7 @@ def main():
     print(table("period of the sine", sines, periodic=True))
     if options.output:
         figures = [{"name": f"{half}_error_gain", "value": max(filter(None, gains["error"])), "unit": "times",
+                    "ran": f"cles-platoon simulate --vehicles {options.vehicles} --hz {options.hz}",
                     "what": f"largest gain of the error from vehicle to vehicle, {half}"} for half, gains in halves.items()]
         result_file.write({"vehicles": options.vehicles, "hz": options.hz, "halves": halves, "sines": sines,
                            "figures": figures}, options.output)

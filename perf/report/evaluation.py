@@ -13,6 +13,7 @@ from .figures import Malformed, figures_of
 SECTIONS = ("latency", "bench", "dsgd", "decision_latency")
 DIGITS = "digits_speed"  # is on the page if it was measured: it needs a data set
 PAGE, RECORD = "evaluation.md", "evaluation.json"
+DECISION_PAGE = "jadc2.md"  # also shows the times of `decision_latency`
 # Section, its picture, the file of the page, its words there.
 PICTURES = (
     ("latency", "fig3", "evaluation_latency", "Round trips and ways over each link"),
