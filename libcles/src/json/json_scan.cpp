@@ -190,7 +190,7 @@ double nearest_double(std::uint64_t digits, std::size_t decimals) noexcept {
     if (beyond > half || (beyond == half && (has_rest || (mantissa & 1U) != 0))) {
         ++mantissa;
     }
-    const auto exponent = static_cast<std::uint64_t>(static_cast<int>(excess) + down - up - 63 + bias);
+    const auto exponent = static_cast<std::uint64_t>(std::int64_t{excess} + down - up - 63 + bias);
     return static_cast<double>(mantissa) * std::bit_cast<double>(exponent << static_cast<unsigned>(kept - 1));
 }
 

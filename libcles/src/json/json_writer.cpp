@@ -33,13 +33,14 @@ bool append_short_decimal(std::string& out, double d) {
     };
     constexpr std::array scales{scale{1e3, 3}, scale{1e6, 6}, scale{1e9, 9}};
     constexpr double most = 1e15;
+    constexpr double half = 0.5; // added, it rounds to the nearest integer
     const auto magnitude = std::fabs(d);
     for (const auto& s : scales) {
         const auto scaled = magnitude * s.factor;
         if (!(scaled < most)) {
             return false;
         }
-        auto digits = static_cast<std::uint64_t>(static_cast<std::int64_t>(scaled + 0.5));
+        auto digits = static_cast<std::uint64_t>(static_cast<std::int64_t>(scaled + half));
         if (static_cast<double>(static_cast<std::int64_t>(digits)) / s.factor != magnitude) {
             continue;
         }
