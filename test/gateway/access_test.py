@@ -144,6 +144,7 @@ class Access(Trust):
         self.refused("gateway", "--http", "1.2.3.4:port", says="an address and a port")
         self.refused("gateway", "--allow-origin", "fleet.example", says="a scheme and a host")
         self.refused("gateway", "--nats", "nats://a", says="--pool NAME")
+        self.refused("gateway", "--http", "127.0.0.1:0", "--peer", "self=tcp://127.0.0.1:1", says="self is not the name of a node")
         self.refused("gateway", "--new-token", "operator", says="--tokens")
         self.refused("gateway", "--new-token", "a b", "--tokens", "tokens", says="the name of a member")
         self.refused("gateway", "--connections", "0", says="--connections")

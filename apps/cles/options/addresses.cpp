@@ -83,7 +83,11 @@ std::pair<std::string, std::string> named_url(const std::string& text) {
     if (equals == std::string::npos || !is_name(text.substr(0, equals))) {
         throw usage_error("--peer '" + text + "': write NAME=URL, as in car1=tcp://127.0.0.1:25370");
     }
-    return {text.substr(0, equals), text.substr(equals + 1)};
+    auto name = text.substr(0, equals);
+    if (stands_for_others(name)) {
+        throw usage_error("--peer '" + text + "': " + name + " is not the name of a node");
+    }
+    return {std::move(name), text.substr(equals + 1)};
 }
 
 void address_book::add_options(CLI::App& command, const std::string& multicast_help) {
@@ -170,11 +174,7 @@ void address_book::check() const {
         check_url(url);
     }
     for (const auto& peer : peer_texts()) {
-        const auto [name, url] = named_url(peer);
-        if (stands_for_others(name)) {
-            throw usage_error("--peer '" + peer + "': " + name + " is not the name of a node");
-        }
-        check_url(url);
+        check_url(named_url(peer).second);
     }
     for (const auto& user : local_users_) {
         const auto equals = user.find('=');

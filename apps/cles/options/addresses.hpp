@@ -44,7 +44,7 @@ class multicast_option {
 /// "lo, eth0"
 std::string joined(const std::vector<std::string>& names, const char* separator = ", ");
 
-/// The two parts of the text of --peer, NAME=URL. \throws usage_error if it has another form
+/// The two parts of the text of --peer, NAME=URL. \throws usage_error if it has another form, or names no node
 std::pair<std::string, std::string> named_url(const std::string& text);
 
 struct saved_context;
