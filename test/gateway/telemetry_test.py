@@ -196,17 +196,21 @@ class LargeFleet(unittest.TestCase):
         env = own_group()
         gateway = Gateway(env=env)
         self.addCleanup(gateway.stop)
-        told = {"uptime_ms": 7000, "tasks": [{"verb": "PULL", "task": "speed"}], "more": "x" * (3 << 20)}
-        nodes = FakeNodes(env, ["fake1", "fake2", "fake3"], json.dumps(told))
-        self.addCleanup(nodes.close)
-        wait_until(lambda: gateway.get("/pull/fake3/cles").status == 200, "they are known")
+        told = {"uptime_ms": 7000, "tasks": [{"verb": "PULL", "task": "speed"}], "more": "x" * (900 << 10)}
+        names = [f"fake{number}" for number in range(1, 11)]
+        for group, more in ((["fat"], "x" * (2 << 20)), (names, "")):
+            nodes = FakeNodes(env, group, json.dumps({**told, "most": more}))
+            self.addCleanup(nodes.close)
+        wait_until(lambda: gateway.get("/pull/fake10/cles").status == 200, "they are known")
         self.assertEqual(gateway.get("/pull/all/cles").status, 413)
         text = gateway.get("/metrics").body
-        for name in ("fake1", "fake2", "fake3"):
+        for name in names:
             self.assertIn(f'cles_uptime_seconds{{node="{name}"}} 7', text)
         self.assertIn('cles_uptime_seconds{node="gateway"}', text)
+        self.assertNotIn('cles_uptime_seconds{node="fat"}', text)
         paths = json.loads(gateway.get("/openapi.json").body)["paths"]
-        self.assertLessEqual({"/pull/fake1/speed", "/pull/fake2/speed", "/pull/fake3/speed"}, set(paths))
+        self.assertLessEqual({f"/pull/{name}/speed" for name in names}, set(paths))
+        self.assertNotIn("/pull/fat/speed", paths)
 
 
 if __name__ == "__main__":

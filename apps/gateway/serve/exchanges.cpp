@@ -2,6 +2,7 @@
 #include "gateway/serve/exchanges.hpp"
 
 #include "gateway/told/openapi.hpp"
+#include "gateway/told/told_limits.hpp"
 #include "gateway/told/update_events.hpp"
 
 #include <boost/asio/awaitable.hpp>
@@ -16,6 +17,7 @@
 #include <cstddef>
 #include <map>
 #include <set>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -347,16 +349,16 @@ class fleet_exchange : public client_exchange, public std::enable_shared_from_th
 
   private:
     void ask_each() {
-        left_.insert(node_.name());
+        left_.emplace(0ms, node_.name());
         for (const auto& peer : node_.peers()) {
-            left_.insert(peer.node);
+            left_.emplace(peer.age, peer.node);
         }
         end_ = std::chrono::steady_clock::now() + patience_with_all;
         ask_next();
     }
     void ask_next() {
         while (open_ < most_asked_at_once && !left_.empty() && std::chrono::steady_clock::now() < end_) {
-            const auto name = std::move(left_.extract(left_.begin()).value());
+            const auto name = std::move(left_.extract(left_.begin()).value().second);
             ++open_;
             node_.async_pull(name + ":" + path_, options(patience_with_one),
                              [self = shared_from_this(), name](error_code code, const cles::json_text& reply) {
@@ -369,9 +371,9 @@ class fleet_exchange : public client_exchange, public std::enable_shared_from_th
     }
     void take(const std::string& name, const std::string& text) {
         --open_;
-        bytes_ += text.size();
-        if (!text.empty() && bytes_ <= most_told_by_all) { // else it is left out
-            told_.emplace(name, text);
+        const bool is_kept = text.size() <= told_limits::reply && bytes_ + text.size() <= most_told_by_all;
+        if (!text.empty() && is_kept && told_.emplace(name, text).second) {
+            bytes_ += text.size();
         }
         if (is_wanted()) {
             ask_next();
@@ -380,9 +382,10 @@ class fleet_exchange : public client_exchange, public std::enable_shared_from_th
 
     cles::service& node_;
     std::string path_;
-    std::set<std::string> left_; // to be asked
-    std::size_t open_ = 0;       // that are asked
-    std::size_t bytes_ = 0;
+    // To be asked, those first that were heard last: silent ones must not use up the time of others.
+    std::set<std::pair<std::chrono::milliseconds, std::string>> left_;
+    std::size_t open_ = 0;  // that are asked
+    std::size_t bytes_ = 0; // that are kept
     std::map<std::string, std::string> told_;
     std::chrono::steady_clock::time_point end_{};
 };

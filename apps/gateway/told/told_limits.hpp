@@ -8,6 +8,7 @@
 namespace gateway::told_limits {
 
 // Bytes.
+inline constexpr std::size_t reply = 1U << 20U;  ///< where each node is asked on its own
 inline constexpr std::size_t node = 129;         ///< POOL.NODE
 inline constexpr std::size_t path = 128;         ///< of a metric
 inline constexpr std::size_t number = 32;        ///< as it is written
