@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: BSL-1.0
 """What hostile clients send: others are served meanwhile, and nothing grows."""
 
+import hashlib
 import json
 import socket
+import tempfile
 import unittest
 
 from gateway_support import FakeNodes, Gateway, own_group, read_all
@@ -23,6 +25,19 @@ class Limits(unittest.TestCase):
             self.addCleanup(clients[-1].close)
             if text:
                 clients[-1].sendall(text)
+        return clients
+
+    def read_nothing(self, gateway, count, fields=""):
+        """Clients that ask for what fake1 replies, and read its first line only."""
+        clients = []
+        for number in range(count):
+            client = socket.socket()
+            self.addCleanup(client.close)
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # so that it waits in the gateway
+            client.connect(("127.0.0.1", gateway.port))
+            client.sendall(f"GET /pull/fake1/cles HTTP/1.1\r\nHost: localhost\r\n{fields}\r\n".encode())
+            self.assertTrue(client.recv(12, socket.MSG_WAITALL).endswith(b" 200"), number)
+            clients.append(client)
         return clients
 
     def test_idle_connections_give_way(self):
@@ -52,21 +67,32 @@ class Limits(unittest.TestCase):
         nodes = FakeNodes(env, ["fake1"], '{"more":"' + "x" * (7 << 20) + '"}')
         self.addCleanup(nodes.close)
         wait_until(lambda: gateway.ask("GET", "/pull/fake1/cles").status == 200, "it is known")
-        clients = []
-        for number in range(9):
-            client = socket.socket()
-            self.addCleanup(client.close)
-            client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # so that it waits in the gateway
-            client.connect(("127.0.0.1", gateway.port))
-            client.sendall(b"GET /pull/fake1/cles HTTP/1.1\r\nHost: localhost\r\n\r\n")
-            self.assertTrue(client.recv(12, socket.MSG_WAITALL).endswith(b" 200"), number)
-            clients.append(client)
+        clients = self.read_nothing(gateway, 9)
         refused = gateway.get("/pull/fake1/cles")
         self.assertEqual((refused.status, json.loads(refused.body)["error"], refused.headers["Retry-After"]), (503, "busy", "1"))
         self.assertTrue(json.loads(gateway.post("/push/fake1/cles2").body)["ran"])
         self.assertEqual(gateway.get("/pull/self/cles").status, 200)
         clients[0].close()
         wait_until(lambda: gateway.get("/pull/fake1/cles").status == 200, "there is room again")
+
+    def test_a_token_has_a_share_of_them(self):
+        with tempfile.NamedTemporaryFile("w") as tokens:
+            for member in ("greedy", "other"):
+                tokens.write(f"{member} {hashlib.sha256(member.encode()).hexdigest()}\n")
+            tokens.flush()
+            env = own_group()
+            gateway = Gateway("--tokens", tokens.name, env=env)
+            self.addCleanup(lambda: self.assertEqual(gateway.stop(), 0))
+            nodes = FakeNodes(env, ["fake1"], '{"more":"' + "x" * (7 << 20) + '"}')
+            self.addCleanup(nodes.close)
+
+            def status(member):
+                return gateway.get("/pull/fake1/cles", Authorization=f"Bearer {member}").status
+            wait_until(lambda: status("other") == 200, "it is known")
+            clients = self.read_nothing(gateway, 2, "Authorization: Bearer greedy\r\n")
+            self.assertEqual((status("greedy"), status("other")), (503, 200))
+            clients[0].close()
+            wait_until(lambda: status("greedy") == 200, "there is room again")
 
     def test_an_address_has_a_limit(self):
         gateway = self.start("--connections", "100", "--connections-per-address", "4")

@@ -88,6 +88,8 @@ BOOST_AUTO_TEST_CASE(a_response_as_it_is_sent) {
     BOOST_TEST(text.find("Connection") == std::string::npos);
     const auto head = gateway::to_text({.status = 200, .body = "{}", .fields = {}}, true, false);
     BOOST_TEST(head.ends_with("\r\nContent-Length: 2\r\n\r\n"));
+    const auto page = gateway::to_text({.status = 200, .fields = {}, .permanent = "<html>"}, true);
+    BOOST_TEST(page.ends_with("\r\nContent-Length: 6\r\n\r\n")); // which follows, and is not copied
     const auto last = gateway::to_text({.status = 204, .body = {}}, false);
     BOOST_TEST(last.starts_with("HTTP/1.1 204 No Content\r\n"));
     BOOST_TEST(last.ends_with("\r\nConnection: close\r\n\r\n"));

@@ -114,7 +114,7 @@ std::string to_text(const http_response& response, bool keep_alive, bool has_bod
         return out + "\r\n";
     }
     out.append("Content-Type: ").append(response.type).append("\r\nContent-Length: ");
-    out.append(std::to_string(response.body.size())).append("\r\n\r\n");
+    out.append(std::to_string(response.body.size() + response.permanent.size())).append("\r\n\r\n");
     if (has_body) {
         out.append(response.body);
     }

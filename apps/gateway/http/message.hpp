@@ -40,7 +40,8 @@ struct http_response {
     int status = 200;
     std::string type = "application/json";
     std::string body{};
-    header_fields fields{}; ///< besides those that every response has
+    header_fields fields{};       ///< besides those that every response has
+    std::string_view permanent{}; ///< instead of the body, what is there as long as the program: it is not copied
 };
 
 /// The response to a request that is refused: a failure, as nodes write them.
@@ -48,7 +49,8 @@ http_response response_of(const refusal& why);
 /// The response to a request that has failed. \param failure as a node has replied it; empty: it has not
 http_response response_to_failure(boost::system::error_code code, std::string_view message, std::string_view failure,
                                   header_fields fields);
-/// The response as it is sent. \param has_body false for HEAD, whose client takes what follows for the next response
+/// The response as it is sent, up to what is permanent of it. \param has_body false for HEAD, whose client takes what
+/// follows for the next response
 std::string to_text(const http_response& response, bool keep_alive, bool has_body = true);
 /// What precedes a stream of server-sent events, which ends with the connection.
 std::string event_stream_head(const header_fields& fields);

@@ -196,12 +196,16 @@ void connection::respond(const http_response& response) {
     count(response.status);
     exchange_.reset();
     set_phase(phase::ending);
-    put(to_text(response, keeps_alive_, reader_.request().method != "HEAD"));
+    const bool has_body = reader_.request().method != "HEAD";
+    permanent_ = has_body ? response.permanent : std::string_view{};
+    put(to_text(response, keeps_alive_, has_body));
 }
 
-// Small ones always have: otherwise clients that do not read would shut others out.
-bool connection::has_room(std::size_t size) const noexcept {
-    return size <= most_at_once || counts_.unwritten + size <= most_unwritten;
+// Small ones always have: otherwise clients that do not read would shut others out. Who needs no token is at this host.
+bool connection::has_room(std::size_t size) const {
+    const auto of_token = token_.empty() ? counts_.unwritten_of.end() : counts_.unwritten_of.find(token_);
+    const bool has_share = of_token == counts_.unwritten_of.end() || of_token->second + size <= most_of_token;
+    return size <= most_at_once || (has_share && counts_.unwritten + size <= most_unwritten);
 }
 
 void connection::begin_events(const header_fields& fields) {
@@ -237,14 +241,31 @@ void connection::end_events() {
 
 void connection::put(std::string_view text) {
     waiting_.append(text);
-    held_ += text.size();
-    counts_.unwritten += text.size();
+    hold(held_ + text.size());
     write();
+}
+
+// So much waits for the client.
+void connection::hold(std::size_t size) {
+    counts_.unwritten = counts_.unwritten - held_ + size;
+    auto& of_token = counts_.unwritten_of[token_];
+    of_token = of_token - held_ + size;
+    if (of_token == 0) {
+        counts_.unwritten_of.erase(token_);
+    }
+    held_ = size;
+}
+
+void connection::set_token(const std::string& hash) {
+    const auto held = held_; // as after 100 Continue
+    hold(0);
+    token_ = hash;
+    hold(held);
 }
 
 // All has been written, or will not be.
 void connection::release() {
-    counts_.unwritten -= std::exchange(held_, 0);
+    hold(0);
     if (waiting_.capacity() > most_at_once) {
         waiting_ = std::string{};
     }
@@ -254,22 +275,22 @@ void connection::write() {
     if (is_writing_ || phase_ == phase::closed) {
         return;
     }
-    if (written_ == output_.size()) {
+    if (unwritten_.empty()) {
         output_.clear();
         output_.swap(waiting_);
-        written_ = 0;
+        unwritten_ = output_.empty() ? std::exchange(permanent_, {}) : std::string_view{output_};
     }
-    if (output_.empty()) {
+    if (unwritten_.empty()) {
         release();
         on_all_written();
         return;
     }
     is_writing_ = true;
     wait(limits_.writing);
-    const auto size = std::min(output_.size() - written_, most_at_once);
-    stream_->write(boost::asio::buffer(output_.data() + written_, size),
+    const auto size = std::min(unwritten_.size(), most_at_once);
+    stream_->write(boost::asio::buffer(unwritten_.data(), size),
                    [self = shared_from_this(), size](error_code code, std::size_t) {
-                       self->written_ += size;
+                       self->unwritten_.remove_prefix(size);
                        self->on_written(code);
                    });
 }

@@ -45,6 +45,7 @@ class connection final : public response_sink, public std::enable_shared_from_th
     /// Ends it at once.
     void close();
 
+    void set_token(const std::string& hash) override;
     void respond(const http_response& response) override;
     void begin_events(const header_fields& fields) override;
     void send(std::string_view events) override;
@@ -65,8 +66,9 @@ class connection final : public response_sink, public std::enable_shared_from_th
     void on_read(boost::system::error_code code, std::size_t size);
     void advance();
     void begin();
-    [[nodiscard]] bool has_room(std::size_t size) const noexcept;
+    [[nodiscard]] bool has_room(std::size_t size) const;
     void put(std::string_view text);
+    void hold(std::size_t size);
     void release();
     void write();
     void on_written(boost::system::error_code code);
@@ -81,6 +83,7 @@ class connection final : public response_sink, public std::enable_shared_from_th
     static constexpr std::size_t most_unread = 65'536; ///< of requests that follow the one that is served
     static constexpr std::size_t most_at_once = 65'536;
     static constexpr std::size_t most_unwritten = 64U << 20U; ///< of all clients
+    static constexpr std::size_t most_of_token = 16U << 20U;  ///< of them
 
     std::unique_ptr<client_stream> stream_;
     request_handler& handler_;
@@ -97,10 +100,12 @@ class connection final : public response_sink, public std::enable_shared_from_th
     bool is_reading_ = false;
     bool is_writing_ = false;
     std::array<char, 16'384> input_{};
-    std::string output_; // being written
-    std::size_t written_ = 0;
-    std::string waiting_;  // follows it
-    std::size_t held_ = 0; // of both
+    std::string output_;         // being written
+    std::string waiting_;        // follows it
+    std::size_t held_ = 0;       // of both
+    std::string token_;          // for which they are held
+    std::string_view permanent_; // follows both
+    std::string_view unwritten_; // of what is being written
 };
 
 } // namespace gateway

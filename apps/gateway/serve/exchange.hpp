@@ -7,8 +7,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 
 namespace gateway {
@@ -30,8 +32,9 @@ struct gateway_counts {
     std::uint64_t timeouts = 0;
     std::uint64_t spans_sent = 0;
     std::uint64_t spans_dropped = 0;
-    /// Bytes that wait for all clients; no metric.
+    /// Bytes that wait for all clients, and for those with each token, by its hash; no metrics.
     std::size_t unwritten = 0;
+    std::map<std::string, std::size_t> unwritten_of{};
 };
 BOOST_DESCRIBE_STRUCT(gateway_counts, (),
                       (connections_open, connections_accepted, connections_refused, connections_evicted, streams_open,
@@ -45,6 +48,8 @@ class response_sink {
     response_sink(const response_sink&) = delete;
     response_sink& operator=(const response_sink&) = delete;
 
+    /// \param hash of the token that the request has, whose share limits what waits; empty: it needs none
+    virtual void set_token(const std::string& hash) = 0;
     virtual void respond(const http_response& response) = 0;
     /// Begins a stream of server-sent events. \param fields further ones of the response
     virtual void begin_events(const header_fields& fields) = 0;

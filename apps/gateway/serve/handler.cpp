@@ -67,6 +67,7 @@ std::shared_ptr<exchange> handler::begin(const http_request& request, const std:
         return nullptr;
     }
     auto what = std::get<asked>(std::move(found));
+    to->set_token(what.who.hash);
     switch (what.where.to) {
     case place::page: {
         const auto* const page = find_asset(what.where.path);
@@ -74,8 +75,8 @@ std::shared_ptr<exchange> handler::begin(const http_request& request, const std:
                         ? refused({.status = 404, .message = "there is no such page", .fields = {}}, request)
                         : http_response{.status = 200,
                                         .type = std::string{page->type},
-                                        .body = std::string{page->content},
-                                        .fields = what.fields});
+                                        .fields = what.fields,
+                                        .permanent = page->content});
         return nullptr;
     }
     case place::session: to->respond(session_response(request, what)); return nullptr;
