@@ -75,7 +75,7 @@ class App extends Component<Record<string, never>, AppState> {
         onSessionEnd(() => this.setState({ needsToken: true, session: null }));
         this.applyTheme();
         void this.learnSession();
-        poll(this.round);
+        poll(this.round, (failure) => this.setState((state: AppState) => ({ now: Date.now(), fleet: { ...state.fleet, failure } })));
     }
     componentDidUpdate(): void {
         this.applyTheme();

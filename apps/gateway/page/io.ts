@@ -146,12 +146,20 @@ export function follow(path: string, take: (events: SentEvent[]) => void, tell: 
     return () => stop.abort();
 }
 
-/** Calls again and again while the page is seen, with a pause in between. \param next does one round, and returns the pause in ms */
-export function poll(next: () => Promise<number>): () => void {
+/**
+ * Calls again and again while the page is seen, with a pause in between.
+ * \param next does one round, and returns the pause in ms \param tell why a round has failed; the next one follows
+ */
+export function poll(next: () => Promise<number>, tell: (wrong: string) => void): () => void {
     let ended = false;
     const run = async (): Promise<void> => {
         while (!ended) {
-            const ms = document.hidden ? 1000 : await next();
+            let ms = 1000;
+            try {
+                ms = document.hidden ? ms : await next();
+            } catch (error) { // any node may tell anything
+                tell(`what was told cannot be read: ${String(error)}`);
+            }
             await pause(ms);
         }
     };

@@ -31,7 +31,7 @@ export class NodeView extends Component<ViewProps, NodeViewState> {
                 nouns: nouns.status === 200 ? nounsIn(nouns.value) : [], whyNoNouns: nouns.status === 200 ? "" : failureText(nouns),
             });
             return 1000;
-        });
+        }, (wrong) => this.setState({ jobs: null, whyNoJobs: wrong, nouns: [], whyNoNouns: wrong }));
     }
     componentWillUnmount(): void {
         this.stop();
