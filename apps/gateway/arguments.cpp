@@ -23,53 +23,44 @@ constexpr const char* gateway_examples =
     "/var/lib/cles/tokens --host fleet.example\n"
     "  cles gateway --behind-proxy --host fleet.example --tokens /var/lib/cles/tokens";
 
-CLI::Option* add_repeated(CLI::App& command, const char* names, std::vector<std::string>& to, const char* type,
-                          const char* help) {
-    return command.add_option(names, to, help)
-        ->type_name(type)
-        ->expected(1)
-        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+template <class Value>
+CLI::Option* add(CLI::App& command, const char* names, Value& to, const char* type, const char* help) {
+    return command.add_option(names, to, help)->type_name(type);
+}
+
+void add_repeated(CLI::App& command, const char* names, std::vector<std::string>& to, const char* type,
+                  const char* help) {
+    add(command, names, to, type, help)->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
 void add_options_of_http(CLI::App& command, gateway_arguments& given) {
     add_repeated(command, "--http", given.http, "ADDRESS:PORT",
                  "Where HTTP clients are served; port 0: a free port; may be repeated (default 127.0.0.1:25380)");
-    command
-        .add_option("--cert", given.certificate,
-                    "The certificate for TLS, with those that lead to its authority, in PEM")
-        ->type_name("FILE");
-    command.add_option("--key", given.certificate_key, "The private key of the certificate, in PEM")->type_name("FILE");
+    add(command, "--cert", given.certificate, "FILE",
+        "The certificate for TLS, with those that lead to its authority, in PEM");
+    add(command, "--key", given.certificate_key, "FILE", "The private key of the certificate, in PEM");
     command.add_flag("--behind-proxy", given.behind_proxy,
                      "A proxy in front has TLS: allows to serve beyond this host without");
     add_repeated(command, "--host", given.hosts, "NAME",
                  "A name by which clients reach it, besides localhost and addresses; may be repeated");
     add_repeated(command, "--allow-origin", given.origins, "ORIGIN",
                  "Another origin whose pages may use it, as in https://fleet.example; may be repeated");
-    command
-        .add_option("--tokens", given.tokens, "The file with the hashes of the tokens that are accepted, of mode 0600")
-        ->type_name("FILE");
-    command
-        .add_option("--new-token", given.new_token,
-                    "Only make a token for this member, print it, and add its hash to --tokens")
-        ->type_name("MEMBER");
-    command.add_option("--connections", given.connections, "How many connections it serves at once (default 1024)")
-        ->type_name("N")
+    add(command, "--tokens", given.tokens, "FILE",
+        "The file with the hashes of the tokens that are accepted, of mode 0600");
+    add(command, "--new-token", given.new_token, "MEMBER",
+        "Only make a token for this member, print it, and add its hash to --tokens");
+    add(command, "--connections", given.connections, "N", "How many connections it serves at once (default 1024)")
         ->check(CLI::Range(1, 100'000).description(""));
-    command
-        .add_option("--connections-per-address", given.connections_per_address,
-                    "How many of these one address has at most; not behind a proxy (default 128)")
-        ->type_name("N")
+    add(command, "--connections-per-address", given.connections_per_address, "N",
+        "How many of these one address has at most; not behind a proxy (default 128)")
         ->check(CLI::Range(1, 100'000).description(""));
-    command
-        .add_option("--otlp", given.collector,
-                    "A collector of OpenTelemetry for the spans of requests, as in http://127.0.0.1:4318")
-        ->type_name("URL");
+    add(command, "--otlp", given.collector, "URL",
+        "A collector of OpenTelemetry for the spans of requests, as in http://127.0.0.1:4318");
 }
 
 void add_options_of_node(CLI::App& command, gateway_arguments& given) {
-    command
-        .add_option("--name,--node", given.name, "The name of its node (default: that of the key, otherwise gateway)")
-        ->type_name("NAME");
+    add(command, "--name,--node", given.name, "NAME",
+        "The name of its node (default: that of the key, otherwise gateway)");
     add_pool_option(command, given.pool, "The pool of its node; nodes of other pools are ignored");
     add_repeated(command, "-l,--listen", given.listen, "URL",
                  "A URL at which its node listens; may be repeated (default tcp://127.0.0.1:0, with --keys tls on all "
@@ -78,12 +69,9 @@ void add_options_of_node(CLI::App& command, gateway_arguments& given) {
     add_repeated(command, "-s,--seed", given.seeds, "URL", "A node to ask for other nodes; may be repeated");
     command.add_flag("--insecure", given.insecure,
                      "Allow links, multicast and NATS beyond this host, where anyone may send any request");
-    command
-        .add_option("--nats", given.nats,
-                    "The URL of a NATS server, through which other pools are reached (needs --pool)")
-        ->type_name("URL");
-    command.add_option("--nats-credentials", given.nats_credentials, "The credentials of a user of NATS")
-        ->type_name("FILE");
+    add(command, "--nats", given.nats, "URL",
+        "The URL of a NATS server, through which other pools are reached (needs --pool)");
+    add(command, "--nats-credentials", given.nats_credentials, "FILE", "The credentials of a user of NATS");
     given.keys.add_optional_to(command, "The key directory of its node, which then authenticates and encrypts");
     given.multicast.add_to(command, "Interfaces on which it finds nodes by their names");
 }

@@ -52,12 +52,8 @@ request_reader::step request_reader::advance() {
         if (s.refused) {
             return step::refused;
         }
-        if (s.parser->is_header_done() && !s.is_head_told) {
-            if (!take_head()) {
-                return step::refused;
-            }
-            s.is_head_told = true;
-            return step::head;
+        if (s.parser->is_header_done() && !std::exchange(s.is_head_told, true)) {
+            return take_head() ? step::head : step::refused;
         }
         if (s.parser->is_done()) {
             s.request.body = std::move(s.parser->get().body());

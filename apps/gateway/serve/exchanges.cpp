@@ -17,7 +17,6 @@
 #include <cstddef>
 #include <map>
 #include <set>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -60,8 +59,7 @@ class client_exchange : public exchange {
         } else {
             refusal ended{.status = 401, .message = std::string{reason}, .fields = what_.fields};
             ended.fields.emplace_back("WWW-Authenticate", "Bearer");
-            const auto to = std::exchange(to_, nullptr);
-            to->respond(response_of(ended));
+            std::exchange(to_, nullptr)->respond(response_of(ended));
         }
         cancel();
         return false;
@@ -87,14 +85,13 @@ class client_exchange : public exchange {
     }
     void respond(std::string body, std::string_view type = "application/json") {
         if (may_be_told()) {
-            const auto to = std::exchange(to_, nullptr);
-            to->respond({.status = 200, .type = std::string{type}, .body = std::move(body), .fields = what_.fields});
+            std::exchange(to_, nullptr)
+                ->respond({.status = 200, .type = std::string{type}, .body = std::move(body), .fields = what_.fields});
         }
     }
     void respond(error_code code, std::string_view failure = {}) {
         if (may_be_told()) {
-            const auto to = std::exchange(to_, nullptr);
-            to->respond(response_to_failure(code, why_, failure, what_.fields));
+            std::exchange(to_, nullptr)->respond(response_to_failure(code, why_, failure, what_.fields));
         }
     }
 

@@ -70,13 +70,11 @@ std::shared_ptr<exchange> handler::begin(const http_request& request, const std:
     to->set_token(what.who.hash);
     switch (what.where.to) {
     case place::page: {
-        const auto* const page = find_asset(what.where.path);
-        to->respond(page == nullptr
-                        ? refused({.status = 404, .message = "there is no such page", .fields = {}}, request)
-                        : http_response{.status = 200,
-                                        .type = std::string{page->type},
-                                        .fields = what.fields,
-                                        .permanent = page->content});
+        if (const auto* const page = find_asset(what.where.path)) {
+            to->respond({.type = std::string{page->type}, .fields = what.fields, .permanent = page->content});
+        } else {
+            to->respond(refused({.status = 404, .message = "there is no such page", .fields = {}}, request));
+        }
         return nullptr;
     }
     case place::session: to->respond(session_response(request, what)); return nullptr;

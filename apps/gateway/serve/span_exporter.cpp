@@ -112,9 +112,9 @@ span_exporter::begun span_exporter::begin(const trace_parent& parent, std::strin
 void span_exporter::add(const std::string& trace, placed_span span) {
     if (waiting_.size() >= most_waiting) {
         ++counts_.spans_dropped;
-        return;
+    } else {
+        waiting_.push_back({.trace = trace, .span = std::move(span)});
     }
-    waiting_.push_back({.trace = trace, .span = std::move(span)});
 }
 
 void span_exporter::end(begun what, std::string_view outcome) {
