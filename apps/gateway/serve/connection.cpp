@@ -15,10 +15,7 @@ connection::connection(std::unique_ptr<client_stream> stream, request_handler& h
 void connection::start() {
     wait(limits_.handshake);
     stream_->handshake([self = shared_from_this()](error_code code, std::size_t) {
-        if (self->phase_ == phase::closed) {
-            return;
-        }
-        if (code) {
+        if (code || self->phase_ == phase::closed) {
             self->close();
             return;
         }
@@ -97,9 +94,6 @@ void connection::read() {
 
 void connection::on_read(error_code code, std::size_t size) {
     is_reading_ = false;
-    if (phase_ == phase::closed) {
-        return;
-    }
     if (code && phase_ == phase::ending) { // it may read the rest nevertheless
         keeps_alive_ = false;
         return;
@@ -188,9 +182,7 @@ void connection::respond(const http_response& response) {
         return;
     }
     if (!has_room(response.body.size())) {
-        std::string why = R"({"error":"busy","message":"too much waits for clients that read slowly","retry_ms":1000)";
-        why.append(reader_.request().method == "GET" ? "}" : R"(,"ran":true})");
-        respond(response_to_failure(cles::errc::busy, {}, why, response.fields));
+        respond(response_to_failure(cles::errc::busy, {}, no_room(), response.fields));
         return;
     }
     count(response.status);
@@ -206,6 +198,12 @@ bool connection::has_room(std::size_t size) const {
     const auto of_token = token_.empty() ? counts_.unwritten_of.end() : counts_.unwritten_of.find(token_);
     const bool has_share = of_token == counts_.unwritten_of.end() || of_token->second + size <= most_of_token;
     return size <= most_at_once || (has_share && counts_.unwritten + size <= most_unwritten);
+}
+
+// What a client is told for which there is none.
+std::string connection::no_room() const {
+    std::string why = R"({"error":"busy","message":"too much waits for clients that read slowly","retry_ms":1000)";
+    return why.append(reader_.request().method == "GET" ? "}" : R"(,"ran":true})");
 }
 
 void connection::begin_events(const header_fields& fields) {
@@ -224,7 +222,13 @@ void connection::send(std::string_view events) {
     if (phase_ == phase::streaming && has_room(events.size())) {
         put(events);
     } else if (phase_ == phase::streaming) {
-        on_gone(); // it cannot be told what it asks for
+        ++counts_.streams_cut;
+        const auto served = exchange_; // until it is cancelled
+        put("event: failure\ndata: " + no_room() + "\n\n");
+        end_events();
+        if (served) {
+            served->cancel();
+        }
     }
 }
 
@@ -297,14 +301,11 @@ void connection::write() {
 
 void connection::on_written(error_code code) {
     is_writing_ = false;
-    if (phase_ == phase::closed) {
-        return;
-    }
     if (code) {
         on_gone();
-        return;
+    } else {
+        write();
     }
-    write();
 }
 
 void connection::on_all_written() {
@@ -328,10 +329,7 @@ void connection::on_all_written() {
     case phase::reading: // after 100 Continue
         wait(limits_.request);
         return;
-    case phase::handshake:
-    case phase::serving:
-    case phase::lingering:
-    case phase::closed: return;
+    default: return;
     }
 }
 

@@ -24,6 +24,7 @@ struct gateway_counts {
     std::uint64_t streams_open = 0;
     std::uint64_t events_sent = 0;
     std::uint64_t updates_missed = 0;
+    std::uint64_t streams_cut = 0;
     std::uint64_t clients_gone = 0;
     std::uint64_t responses_2xx = 0;
     std::uint64_t responses_4xx = 0;
@@ -38,8 +39,8 @@ struct gateway_counts {
 };
 BOOST_DESCRIBE_STRUCT(gateway_counts, (),
                       (connections_open, connections_accepted, connections_refused, connections_evicted, streams_open,
-                       events_sent, updates_missed, clients_gone, responses_2xx, responses_4xx, responses_5xx, denied,
-                       timeouts, spans_sent, spans_dropped))
+                       events_sent, updates_missed, streams_cut, clients_gone, responses_2xx, responses_4xx,
+                       responses_5xx, denied, timeouts, spans_sent, spans_dropped))
 
 /// The client of a request: where its response goes. It is responded to once, as a whole or as a stream.
 class response_sink {
@@ -53,7 +54,8 @@ class response_sink {
     virtual void respond(const http_response& response) = 0;
     /// Begins a stream of server-sent events. \param fields further ones of the response
     virtual void begin_events(const header_fields& fields) = 0;
-    /// A part of the stream, which waits until it can be written.
+    /// A part of the stream, which waits until it can be written. If there is no room for it, the stream ends with a
+    /// failure, and the exchange is cancelled before this returns.
     virtual void send(std::string_view events) = 0;
     virtual void end_events() = 0;
 
