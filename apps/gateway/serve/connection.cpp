@@ -201,7 +201,7 @@ bool connection::has_room(std::size_t size) const {
 }
 
 // What a client is told for which there is none.
-std::string connection::no_room() const {
+std::string connection::no_room() {
     std::string why = R"({"error":"busy","message":"too much waits for clients that read slowly","retry_ms":1000)";
     return why.append(reader_.request().method == "GET" ? "}" : R"(,"ran":true})");
 }

@@ -67,7 +67,7 @@ class connection final : public response_sink, public std::enable_shared_from_th
     void advance();
     void begin();
     [[nodiscard]] bool has_room(std::size_t size) const;
-    [[nodiscard]] std::string no_room() const;
+    [[nodiscard]] std::string no_room();
     void put(std::string_view text);
     void hold(std::size_t size);
     void release();
