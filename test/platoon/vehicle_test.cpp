@@ -74,6 +74,25 @@ BOOST_AUTO_TEST_CASE(binds_what_it_hears_of) {
     BOOST_TEST(one.who.seen() == "v1");
 }
 
+BOOST_AUTO_TEST_CASE(a_false_clock_does_not_change_how_it_drives) {
+    const auto driven = [](std::optional<double> utc) {
+        driving one{setup_of("v1", "v0")};
+        for (double t = 0; t < 3; t += 0.04) {
+            one.until(t);
+            one.who.receive("v0", told_by("", "v0", t, 15 + 25 * t), t, false);
+            if (utc) {
+                one.who.note_clock("v0", t, *utc, t);
+            }
+        }
+        return one.who.who()->position().x;
+    };
+    const double expected = driven(std::nullopt);
+    BOOST_TEST(std::isfinite(expected));
+    for (const double utc : {std::nan(""), 3600.0, -3600.0, 1e308, -HUGE_VAL}) {
+        BOOST_TEST(driven(utc) == expected, utc);
+    }
+}
+
 BOOST_AUTO_TEST_CASE(counts_what_arrives_and_what_its_node_reports_as_missing) {
     driving one{setup_of("v1", "v0")};
     one.until(0.1);

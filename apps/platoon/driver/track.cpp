@@ -2,6 +2,7 @@
 #include "platoon/driver/track.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace platoon {
 namespace {
@@ -33,6 +34,13 @@ void track::assume(double command, double now) {
     base_.a = there.a;
     base_.u = command;
     base_.j = 0;
+}
+
+double track::offset() const {
+    // Of updates that arrive at all, the fastest shows the difference within the horizon. Written so that NaN is not
+    // used.
+    const bool is_shown = difference_ && std::abs(*difference_ - offset_) <= horizon;
+    return is_shown ? *difference_ : offset_;
 }
 
 double track::age(double now) const { return std::clamp(now - offset() - base_.t, 0.0, horizon); }

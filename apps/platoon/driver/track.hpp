@@ -15,7 +15,7 @@ class track {
     /// \return false if a newer update has been received before, or this one
     bool receive(const state& heard, double now);
     /// Its clock differs by this, local time minus its own, s. Before this is known, the fastest update counts as one
-    /// that took no time.
+    /// that took no time; the same if the updates contradict it, or it is no number.
     void set_difference(double local_minus_its) noexcept { difference_ = local_minus_its; }
     [[nodiscard]] bool known() const noexcept { return last_.has_value(); }
     [[nodiscard]] const state& last() const noexcept { return *last_; }
@@ -30,7 +30,7 @@ class track {
 
   private:
     [[nodiscard]] double age(double now) const;
-    [[nodiscard]] double offset() const { return difference_.value_or(offset_); }
+    [[nodiscard]] double offset() const;
 
     std::optional<state> last_;
     state base_{};        ///< from which its motion is extrapolated: the last update, or what has been assumed since

@@ -131,6 +131,9 @@ std::set<std::string> vehicle::clocks_to_ask(double now) {
 }
 
 void vehicle::note_clock(const std::string& of, double sent, double utc, double received) {
+    if (!std::isfinite(utc)) {
+        return; // `null` is read as NaN, which would remain among the last exchanges
+    }
     auto& one = clocks_[of].difference;
     one.add(sent, utc - setup_.start_utc, received);
     if (driver_) {
