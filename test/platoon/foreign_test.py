@@ -31,6 +31,15 @@ class Foreign(unittest.TestCase):
                                 text=True, env={**environment(), "CLES_MULTICAST": self.group})
         self.addCleanup(ended, node)
 
+    def talk_nonsense(self):
+        """In the same group, under the same noun."""
+        node = subprocess.Popen([CLES, "publish", "x:state"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                text=True, env={**environment(), "CLES_MULTICAST": self.group})
+        self.addCleanup(ended, node)
+        self.addCleanup(node.stdin.close)
+        node.stdin.write('{"mode":"car"}\n')
+        node.stdin.flush()
+
     def follow(self, i, *more):
         vehicle = start("vehicle", "--name", f"v{i}", "--ahead", f"v{i - 1}", "--turn", i, "--turns", 4, "--multicast", self.group,
                         "--start-ns", self.start_ns, "--start-utc", f"{self.start_utc:.6f}", "--seconds", 14, "--report", *more)
@@ -48,6 +57,7 @@ class Foreign(unittest.TestCase):
 
     def test_old_and_new_vehicles_follow_a_leader_of_another_make(self):
         self.lead(3, 14)
+        self.talk_nonsense()
         self.follow(1, "--x", -15, "--leader", "v0")
         self.follow(2, "--x", -30, "--dialect", "older")
         last = self.follow(3, "--x", -45)

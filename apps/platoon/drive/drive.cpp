@@ -7,6 +7,7 @@
 #include "platoon/drive/child.hpp"
 #include "platoon/drive/course.hpp"
 #include "platoon/drive/laboratory_fleet.hpp"
+#include "platoon/drive/next_state.hpp"
 #include "platoon/drive/observer.hpp"
 #include "platoon/drive/relay.hpp"
 #include "platoon/drive/temporary_folder.hpp"
@@ -167,7 +168,7 @@ class drive_supervisor {
     asio::awaitable<void> hear() {
         auto feed = co_await service_.async_bind<state_message>("all:state");
         for (;;) {
-            const auto item = co_await feed.async_next();
+            const auto item = co_await next_state(feed);
             if (item.has_value()) {
                 take(item.publisher, item.value);
                 foreign_vehicle_ = children_.contains(item.publisher) ? foreign_vehicle_ : item.publisher;
@@ -191,7 +192,7 @@ class drive_supervisor {
                 auto feed = co_await service_.async_bind<state_message>(
                     name + ":state", cles::bind_options{}.at(faults_->url_of(name), name));
                 for (;;) {
-                    const auto item = co_await feed.async_next();
+                    const auto item = co_await next_state(feed);
                     if (item.has_value()) {
                         take(name, item.value);
                     }

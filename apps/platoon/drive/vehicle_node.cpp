@@ -3,6 +3,7 @@
 
 #include "client/member_key.hpp"
 #include "output/log_line.hpp"
+#include "platoon/drive/next_state.hpp"
 #include "platoon/simulation/simulation.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -180,7 +181,7 @@ asio::awaitable<known_vehicles> vehicle_node::listen() {
     });
     try {
         for (;;) {
-            const auto item = co_await feed.async_next();
+            const auto item = co_await next_state(feed);
             if (item.has_value()) {
                 const auto told = to_state(item.value, options_.setup.start_utc);
                 if (implausible(told, options_.setup.driving.law).empty()) {
@@ -279,7 +280,7 @@ asio::awaitable<void> vehicle_node::hear(std::string name) {
     auto feed = co_await service_.async_bind<state_message>(name + ":state", cles::bind_options{}.multicast());
     bool first = true; // may be an older one, repeated for this binder
     while (vehicle_.is_bound_to(name)) {
-        const auto item = co_await feed.async_next();
+        const auto item = co_await next_state(feed);
         if (item.has_value()) {
             if (vehicle_.receive(name, item.value, now(), first) && item.value.sent_ns) {
                 vehicle_.note_latency(static_cast<double>(monotonic_ns() - *item.value.sent_ns) * 1e-3);
@@ -287,6 +288,9 @@ asio::awaitable<void> vehicle_node::hear(std::string name) {
             first = false;
         } else if (item.kind == cles::feed_event::gap) {
             vehicle_.note_gap(item.missed, now());
+            if (!item.text.empty() && reported_.insert(name).second) {
+                vehicle_.note(now(), "dropped", "an update of " + name + ": " + item.text);
+            }
         }
     }
 }
@@ -295,7 +299,7 @@ asio::awaitable<void> vehicle_node::watch(std::string name) {
     auto feed = co_await service_.async_bind<state_message>(
         name + ":state", cles::bind_options{}.at(exchange_url(options_.exchange, name), name));
     while (vehicle_.seen() == name) {
-        const auto item = co_await feed.async_next();
+        const auto item = co_await next_state(feed);
         if (item.has_value()) {
             vehicle_.see(name, item.value);
         }

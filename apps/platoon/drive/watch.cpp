@@ -5,6 +5,7 @@
 
 #include "client/member_key.hpp"
 #include "platoon/drive/course.hpp"
+#include "platoon/drive/next_state.hpp"
 #include "platoon/drive/observer.hpp"
 #include "platoon/drive/vehicle_node.hpp"
 #include "platoon/drive/view.hpp"
@@ -77,7 +78,7 @@ class platoon_watch {
     asio::awaitable<void> hear() {
         auto feed = co_await service_.async_bind<state_message>("all:state");
         for (;;) {
-            const auto item = co_await feed.async_next();
+            const auto item = co_await next_state(feed);
             if (!item.has_value()) {
                 continue;
             }
