@@ -93,6 +93,19 @@ BOOST_AUTO_TEST_CASE(a_false_clock_does_not_change_how_it_drives) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(who_has_no_clock_is_seldom_asked) {
+    driving one{setup_of("v1", "v0")};
+    one.until(0.1);
+    BOOST_TEST((one.who.clocks_to_ask(0.1) == names{"v0"}));
+    BOOST_TEST(one.who.clocks_to_ask(0.2).empty());
+    BOOST_TEST((one.who.clocks_to_ask(0.4) == names{"v0"})); // it has not answered
+    one.who.note_no_clock("v0", 0.5);
+    BOOST_TEST(one.who.clocks_to_ask(10).empty());
+    BOOST_TEST((one.who.clocks_to_ask(11) == names{"v0"}));
+    one.who.note_clock("v0", 11, 11, 11);
+    BOOST_TEST((one.who.clocks_to_ask(11.5) == names{"v0"}));
+}
+
 BOOST_AUTO_TEST_CASE(counts_what_arrives_and_what_its_node_reports_as_missing) {
     driving one{setup_of("v1", "v0")};
     one.until(0.1);

@@ -313,8 +313,10 @@ asio::awaitable<void> vehicle_node::ask_clock(std::string name) {
         const auto told =
             co_await service_.async_pull<clock_reading>(name + ":clock", cles::call_options{}.deadline(clock_deadline));
         vehicle_.note_clock(name, sent, told.utc, now());
-    } catch (const cles::error&) {
-        co_return;
+    } catch (const cles::error& e) {
+        if (e.code() == cles::errc::no_task) {
+            vehicle_.note_no_clock(name, now());
+        }
     }
 }
 

@@ -17,7 +17,8 @@ constexpr double process_delay = 0.2;            // s, by which an update may be
 constexpr std::size_t first_exchanges = 4;       // with the clock of another vehicle, ...
 constexpr double first_interval = 0.2;           // ... which follow each other in this time, s; the others in this one:
 constexpr double exchange_interval = 2;
-constexpr double leave_duration = 1; // s in which it announces that it leaves
+constexpr double no_clock_interval = 10; // s, after which one that had no such task is asked again
+constexpr double leave_duration = 1;     // s in which it announces that it leaves
 
 } // namespace
 
@@ -120,7 +121,9 @@ std::set<std::string> vehicle::clocks_to_ask(double now) {
     if (!driver_) {
         return names;
     }
-    for (const auto& name : driver_->needed()) {
+    const auto needed = driver_->needed();
+    std::erase_if(clocks_, [&needed](const auto& each) { return !needed.contains(each.first); });
+    for (const auto& name : needed) {
         auto& one = clocks_[name];
         if (now >= one.ask_at) {
             one.ask_at = now + (one.difference.exchanges() < first_exchanges ? first_interval : exchange_interval);
@@ -129,6 +132,8 @@ std::set<std::string> vehicle::clocks_to_ask(double now) {
     }
     return names;
 }
+
+void vehicle::note_no_clock(const std::string& of, double now) { clocks_[of].ask_at = now + no_clock_interval; }
 
 void vehicle::note_clock(const std::string& of, double sent, double utc, double received) {
     if (!std::isfinite(utc)) {

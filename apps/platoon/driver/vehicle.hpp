@@ -69,6 +69,8 @@ class vehicle {
     std::set<std::string> clocks_to_ask(double now);
     /// One has answered. \param utc what it said \param sent, received local times
     void note_clock(const std::string& of, double sent, double utc, double received);
+    /// One has answered that it has no such task.
+    void note_no_clock(const std::string& of, double now);
     /// UTC by its own clock.
     [[nodiscard]] double utc(double now) const noexcept { return setup_.start_utc + now; }
     /// An update that no fault has affected.
