@@ -9,6 +9,7 @@ import time
 import unittest
 
 from support import free_port
+from two_hosts import cannot_be_made
 
 PLATOON = os.environ["PLATOON"]
 PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "60"))
@@ -80,6 +81,8 @@ class DriveTest(unittest.TestCase):
     def drive(self, *arguments, group=None):
         """The object that it prints. The exit code is 4 if the drive was too short for the manoeuvre."""
         ended, out, err = run("run", "--multicast", group or free_group(), "--json", *arguments)
+        if ended == 3 and "faults need a network namespace" in err:
+            cannot_be_made(err.strip())
         self.assertIn(ended, (0, 4), err + out[:2000])
         found = json.loads(out)
         self.assertEqual(ended, 4 if found["steady"] and not found["verdict"]["ended"] else 0)
