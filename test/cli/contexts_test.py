@@ -84,17 +84,17 @@ class Contexts(NodeTest):
             self.assertEqual(saved, (0, "", ""), variables)
         self.assertEqual(self.listed()["contexts"]["fourth"]["at"], "")
 
-    @unittest.skipIf(os.geteuid() == 0, "root reads everything")
     def test_a_file_that_cannot_be_read_is_not_replaced(self):
         self.save("lab", "--at", self.node.url)
         file = os.path.join(self.folder, "cles", "contexts.json")
-        os.chmod(file, 0)
+        os.remove(file)
+        # A link to itself cannot be opened, not even by root, and whoever replaces a file replaces it.
+        os.symlink(file, file)
         for arguments in (("save", "x", "--pool", "north"), ("list",)):
             code, _, err = self.run_in("context", *arguments)
             self.assertEqual(code, 2, arguments)
             self.assertIn("cannot be read", err)
-        os.chmod(file, 0o600)
-        self.assertEqual(list(self.listed()["contexts"]), ["lab"])
+        self.assertEqual(os.readlink(file), file)
 
     def test_keys_are_found_in_any_folder(self):
         self.save("fleet", "--keys", "somewhere/car1")
