@@ -46,7 +46,8 @@ saved_context find_used_context() {
 saved_contexts read_contexts() {
     const auto path = contexts_file();
     std::ifstream file{path, std::ios::binary};
-    if (std::error_code code; path.empty() || (!file && !fs::exists(path, code))) {
+    if (std::error_code code;
+        path.empty() || (!file && fs::symlink_status(path, code).type() == fs::file_type::not_found)) {
         return {};
     }
     if (!file) { // otherwise those in it would be lost when it is replaced
