@@ -231,15 +231,15 @@ def measure(options):
     with tempfile.TemporaryDirectory(prefix="cles-floods-") as folder:
         fleet = Measured(options.build, pathlib.Path(folder), SMOKE_RATE if options.smoke else USUAL_RATE)
         try:
-            usual = {by: fleet.members(by, options.seconds) for by in ("tls", "udp")}
             newcomers = 2 if options.smoke else 100
             for kind in options.only:
                 by = "udp" if kind.startswith("hellos") else "tls"
+                usual = fleet.members(by, options.seconds)
                 usual_newcomers = fleet.newcomers(newcomers) if kind == "rosters" else None
                 with fleet.flood(kind, by):
                     flooded = fleet.members(by, options.seconds)
                     newer = fleet.newcomers(newcomers) if usual_newcomers else None
-                good = reached(f"{kind}, members by {by}", usual[by], flooded) and good
+                good = reached(f"{kind}, members by {by}", usual, flooded) and good
                 if newer:
                     good = reached(f"{kind}, members that bring a newer roster", usual_newcomers, newer) and good
         finally:

@@ -10,7 +10,6 @@
 #include <cles/service.hpp>
 
 #include <boost/asio/io_context.hpp>
-#include <boost/asio/steady_timer.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -20,6 +19,7 @@
 #include <exception>
 #include <memory>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -46,68 +46,70 @@ struct outcomes {
     }
 };
 
-/// A member that has just been started.
-class member_node : public std::enable_shared_from_this<member_node> {
+/// Starts a member, again and again, each time with a service and a context of its own, as a process that has just
+/// begun.
+class member {
   public:
-    member_node(boost::asio::io_context& io, const std::string& fleet, const std::string& name, const std::string& node)
-        : service_(io, options_of(fleet, name, node)) {}
+    member(std::string fleet, std::string name, std::string node)
+        : fleet_(std::move(fleet)), name_(std::move(name)), node_(std::move(node)) {}
 
-    void ask(outcomes& into) {
-        ++into.begun;
+    /// Starts it at `next`, every `between` after it, and before `end`; at least once.
+    void run(steady::time_point next, steady::time_point end) {
+        do {
+            std::this_thread::sleep_until(next);
+            start();
+            next += between;
+        } while (next < end);
+    }
+
+    [[nodiscard]] const outcomes& found() const { return found_; }
+
+  private:
+    void start() {
+        cles::service_options options{.name = name_};
+        options.peers.emplace("node", node_);
+        options.security = cles::secured(fleet_ + "/" + name_);
+        boost::asio::io_context io{1};
+        cles::service started{io, std::move(options)};
+        ++found_.begun;
         const auto begun = steady::now();
-        service_.async_pull(
-            "node:cles", cles::call_options{}.deadline(longest),
-            [self = shared_from_this(), &into, begun](boost::system::error_code code, const cles::json_text&) {
-                into.succeeded += code ? 0U : 1U;
-                into.took.push_back(code ? std::chrono::nanoseconds{longest} : steady::now() - begun);
-            });
-    }
-
-  private:
-    static cles::service_options options_of(const std::string& fleet, const std::string& name,
-                                            const std::string& node) {
-        cles::service_options made{.name = name};
-        made.peers.emplace("node", node);
-        made.security = cles::secured(fleet + "/" + name);
-        return made;
-    }
-
-    cles::service service_;
-};
-
-class started_members {
-  public:
-    started_members(std::string fleet, std::size_t members, std::string node, std::chrono::seconds span)
-        : fleet_(std::move(fleet)), node_(std::move(node)), end_(steady::now() + span) {
-        for (std::size_t i = 0; i < members; ++i) {
-            timers_.push_back(std::make_unique<boost::asio::steady_timer>(io_));
-            wait(i, steady::now() + between * static_cast<int>(i) / static_cast<int>(members));
-        }
-    }
-
-    outcomes run() {
-        io_.run();
-        return std::move(found_);
-    }
-
-  private:
-    void wait(std::size_t member, steady::time_point until) {
-        timers_[member]->expires_at(until);
-        timers_[member]->async_wait([this, member, until](boost::system::error_code) {
-            std::make_shared<member_node>(io_, fleet_, "m" + std::to_string(member), node_)->ask(found_);
-            if (until + between < end_) {
-                wait(member, until + between);
-            }
-        });
+        started.async_pull("node:cles", cles::call_options{}.deadline(longest),
+                           [&](boost::system::error_code code, const cles::json_text&) {
+                               found_.succeeded += code ? 0U : 1U;
+                               found_.took.push_back(code ? std::chrono::nanoseconds{longest} : steady::now() - begun);
+                               io.stop();
+                           });
+        io.run();
     }
 
     std::string fleet_;
+    std::string name_;
     std::string node_;
-    steady::time_point end_;
-    boost::asio::io_context io_{1};
-    std::vector<std::unique_ptr<boost::asio::steady_timer>> timers_;
     outcomes found_;
 };
+
+/// Each member has a thread, so that none waits for another that is being started.
+outcomes run(const std::string& fleet, std::size_t count, const std::string& node, std::chrono::seconds span) {
+    std::vector<std::unique_ptr<member>> members;
+    for (std::size_t i = 0; i < count; ++i) {
+        members.push_back(std::make_unique<member>(fleet, "m" + std::to_string(i), node));
+    }
+    {
+        std::vector<std::jthread> threads;
+        const auto begin = steady::now();
+        for (std::size_t i = 0; i < count; ++i) {
+            const auto first = begin + between * static_cast<int>(i) / static_cast<int>(count);
+            threads.emplace_back([&each = *members[i], first, end = begin + span] { each.run(first, end); });
+        }
+    }
+    outcomes all;
+    for (const auto& each : members) {
+        all.begun += each->found().begun;
+        all.succeeded += each->found().succeeded;
+        all.took.insert(all.took.end(), each->found().took.begin(), each->found().took.end());
+    }
+    return all;
+}
 
 } // namespace
 
@@ -117,9 +119,8 @@ int main(int argc, char** argv) {
             std::fputs("usage: cles_member_links FLEET MEMBERS URL SECONDS\n", stderr);
             return 2;
         }
-        started_members all{argv[1], std::strtoul(argv[2], nullptr, 10), argv[3],
-                            std::chrono::seconds{std::strtol(argv[4], nullptr, 10)}};
-        auto found = all.run();
+        auto found = run(argv[1], std::strtoul(argv[2], nullptr, 10), argv[3],
+                         std::chrono::seconds{std::strtol(argv[4], nullptr, 10)});
         std::printf(R"({"begun":%zu,"succeeded":%zu,"p50_ms":%.3f,"p99_ms":%.3f})"
                     "\n",
                     found.begun, found.succeeded, found.quantile(0.5), found.quantile(0.99));
