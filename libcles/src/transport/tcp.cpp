@@ -26,21 +26,23 @@ using boost::system::error_code;
 
 namespace {
 
-// Detects after `limits::stall` that a peer's host is gone or unreachable, whether data is in transit to it or not.
-void notice_loss(stream_socket& socket, const limits& bounds) {
+// No delay, and how soon a peer is lost: whose host has been gone or unreachable for `limits::stall`, whether data is
+// in transit to it or not. Accepted sockets inherit this from the listening one (Linux), so that a connection of a
+// stranger costs no further system calls.
+void set_options(int socket, const limits& bounds) {
     constexpr int least = 6; // seconds
     constexpr int most = 3600;
     const auto wanted = std::chrono::duration_cast<std::chrono::seconds>(bounds.stall).count();
     const int seconds = static_cast<int>(std::clamp<decltype(wanted)>(wanted, least, most));
-    const auto set = [&](int option, int value) {
-        ::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof value);
+    const auto set = [socket](int level, int option, int value) {
+        static_cast<void>(::setsockopt(socket, level, option, &value, sizeof value));
     };
-    set(TCP_USER_TIMEOUT, seconds * 1000);
-    set(TCP_KEEPIDLE, seconds / 2);
-    set(TCP_KEEPINTVL, seconds / 6);
-    set(TCP_KEEPCNT, 3);
-    error_code ignored;
-    socket.set_option(asio::socket_base::keep_alive{true}, ignored);
+    set(IPPROTO_TCP, TCP_NODELAY, 1);
+    set(IPPROTO_TCP, TCP_USER_TIMEOUT, seconds * 1000);
+    set(IPPROTO_TCP, TCP_KEEPIDLE, seconds / 2);
+    set(IPPROTO_TCP, TCP_KEEPINTVL, seconds / 6);
+    set(IPPROTO_TCP, TCP_KEEPCNT, 3);
+    set(SOL_SOCKET, SO_KEEPALIVE, 1);
 }
 
 tcp::endpoint ip_endpoint(const stream_address& any) {
@@ -50,14 +52,12 @@ tcp::endpoint ip_endpoint(const stream_address& any) {
     return end;
 }
 
-// Sets the options of a connected socket, too.
-identity identify(stream_socket& socket, const url& where, const limits& bounds) {
+// Sets the traffic class of a connected socket, too.
+identity identify(stream_socket& connected, const url& where) {
     error_code ignored;
-    set_traffic_class(socket.native_handle(), where, ignored);
-    socket.set_option(tcp::no_delay{true}, ignored);
-    notice_loss(socket, bounds);
+    set_traffic_class(connected.native_handle(), where, ignored);
     error_code gone;
-    const auto peer = socket.remote_endpoint(gone);
+    const auto peer = connected.remote_endpoint(gone);
     return gone ? identity{.transport = where.scheme, .address = {}, .name = {}, .uid = {}}
                 : identity_at(where.scheme, ip_endpoint(peer));
 }
@@ -87,18 +87,23 @@ std::unique_ptr<acceptor> listen_tcp(const asio::any_io_executor& executor, cons
     if (endpoint.address().is_v6()) {
         socket.set_option(asio::ip::v6_only{true});
     }
+    set_options(socket.native_handle(), bounds);
     socket.bind(endpoint);
     socket.listen();
     auto local = url_of(where.scheme, ip_endpoint(socket.local_endpoint()));
     return handle_of(std::make_shared<stream_acceptor>(
         std::move(socket), std::move(local), bounds,
-        [where, bounds](stream_socket& accepted) { return identify(accepted, where, bounds); }, std::move(make_codec)));
+        [where](stream_socket& accepted) { return identify(accepted, where); }, std::move(make_codec)));
 }
 
 std::function<void()> dial_tcp(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done, codec_maker make_codec) {
     const auto dialler = std::make_shared<stream_dialler>(
-        executor, bounds, [where, bounds](stream_socket& made) { return identify(made, where, bounds); },
+        executor, bounds,
+        [where, bounds](stream_socket& made) {
+            set_options(made.native_handle(), bounds);
+            return identify(made, where);
+        },
         std::move(done), std::move(make_codec));
     const auto lookup = std::make_shared<host_lookup>(executor, where);
     const auto connect = [dialler, port = where.port,
