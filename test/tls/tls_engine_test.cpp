@@ -431,4 +431,35 @@ BOOST_AUTO_TEST_CASE(unused_memory_is_freed_and_comes_back) {
     BOOST_TEST(far.text == "again\n");
 }
 
+BOOST_AUTO_TEST_CASE(a_peer_gets_long_turns_only_once_it_is_admitted) {
+    connect();
+    const auto longest_turn = [this] {
+        near.say(std::string(400'000, 'x'));
+        auto rest = near.take_output();
+        std::size_t longest = 0;
+        while (!rest.empty()) {
+            const auto count = std::min(far.engine.prepare().size(), rest.size());
+            longest = std::max(longest, count);
+            far.receive(rest.substr(0, count));
+            rest.erase(0, count);
+        }
+        return longest;
+    };
+    BOOST_TEST(longest_turn() == 16'384U);
+    far.engine.admit();
+    BOOST_TEST(longest_turn() == 65'536U);
+    BOOST_TEST(far.text.size() == 800'000U);
+}
+
+BOOST_AUTO_TEST_CASE(before_its_handshake_it_costs_no_memory_of_openssl_and_sends_nothing) {
+    end unused{far_context, role::server};
+    BOOST_TEST(unused.engine.buffered() < 100U);
+    boost::system::error_code why;
+    unused.engine.write("text", why);
+    BOOST_TEST((why == tls_errc::failed));
+    unused.engine.finish();
+    unused.engine.shrink();
+    BOOST_TEST(unused.take_output().empty());
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -17,7 +17,6 @@ namespace cles::tls {
 namespace {
 
 constexpr std::size_t initial_input = 4096;
-constexpr std::size_t max_input = 65536;
 constexpr std::size_t openssl_buffers = 34'000; // roughly: one record in each direction
 
 // A peer may change its keys, or send another message of the handshake, so often after it: this many times, and once
@@ -83,28 +82,31 @@ struct engine_bio {
 
 void tls_engine::free_ssl::operator()(ssl_st* ssl) const noexcept { ::SSL_free(ssl); }
 
-tls_engine::tls_engine(const tls_context& shared, role as) : ssl_(::SSL_new(shared.get())) {
+tls_engine::~tls_engine() = default;
+
+// False if there is no memory.
+bool tls_engine::begin() {
+    ssl_.reset(::SSL_new(shared_.get()));
     auto* bio = ssl_ ? engine_bio::make(*this) : nullptr;
     if (bio == nullptr) {
-        throw security::security_error{"cannot make a TLS connection: " + take_openssl_error().message()};
+        return false;
     }
     ::SSL_set_bio(ssl_.get(), bio, bio);
     ::SSL_set_msg_callback(ssl_.get(), engine_bio::on_message);
     ::SSL_set_msg_callback_arg(ssl_.get(), this);
-    if (as == role::client) {
+    if (role_ == role::client) {
         ::SSL_set_connect_state(ssl_.get());
     } else {
         ::SSL_set_accept_state(ssl_.get());
     }
+    return true;
 }
-
-tls_engine::~tls_engine() = default;
 
 std::span<char> tls_engine::prepare() {
     if (begin_ == end_) {
         // What filled the space will probably do so again.
         const auto wanted = capacity_ == 0 ? initial_input : end_ == capacity_ ? capacity_ * 4 : capacity_;
-        if (const auto capacity = std::min(wanted, max_input); capacity != capacity_) {
+        if (const auto capacity = std::min(wanted, max_input_); capacity != capacity_) {
             input_.reset(new char[capacity]); // uninitialised on purpose
             capacity_ = capacity;
         }
@@ -126,6 +128,11 @@ tls_engine::status tls_engine::status_of(int result, boost::system::error_code& 
 
 tls_engine::status tls_engine::shake_hands(boost::system::error_code& why) {
     ::ERR_clear_error();
+    if (!ssl_ && !begin()) {
+        failed_ = true;
+        why = take_openssl_error();
+        return status::failed;
+    }
     has_buffers_ = true;
     const int result = ::SSL_do_handshake(ssl_.get());
     if (result != 1) {
@@ -177,6 +184,10 @@ void tls_engine::write(std::string_view text, boost::system::error_code& why) {
     if (text.empty()) {
         return;
     }
+    if (!established_) {
+        why = tls_errc::failed;
+        return;
+    }
     has_buffers_ = true;
     if (written_ >= records_per_key) {
         ::SSL_key_update(ssl_.get(), SSL_KEY_UPDATE_NOT_REQUESTED);
@@ -203,7 +214,7 @@ std::size_t tls_engine::buffered() const noexcept {
 }
 
 void tls_engine::shrink() {
-    if (::SSL_free_buffers(ssl_.get()) == 1) {
+    if (ssl_ && ::SSL_free_buffers(ssl_.get()) == 1) {
         has_buffers_ = false;
     }
     if (encrypted_.empty()) {

@@ -19,15 +19,15 @@ struct ssl_st;
 namespace cles::tls {
 
 /// One TLS connection, sans-I/O: what arrives is written to `prepare()`, and what is to be sent is appended to
-/// `encrypted()`.
+/// `encrypted()`. OpenSSL's part, which costs most, is made when the handshake begins.
 class tls_engine {
   public:
     enum class role : std::uint8_t { client, server };
     /// `ended`: the peer has said that it sends no more. After `failed`, there may be an alert to send.
     using status = transport::stream_codec::status;
 
-    /// \throws security::security_error if there is no memory
-    tls_engine(const tls_context& shared, role as);
+    /// `shared` outlives it.
+    tls_engine(const tls_context& shared, role as) noexcept : shared_(shared), role_(as) {}
     tls_engine(const tls_engine&) = delete;
     tls_engine& operator=(const tls_engine&) = delete;
     ~tls_engine();
@@ -35,10 +35,13 @@ class tls_engine {
     /// Space for bytes from the peer; not empty if the last status was `need_input`.
     std::span<char> prepare();
     void commit(std::size_t count) noexcept { end_ += count; }
+    /// The peer is admitted: `prepare` may return more than the space for one record. Strangers get no longer turns
+    /// than that, so that those who send much do not delay others.
+    void admit() noexcept { max_input_ = 65536; }
     /// To be sent; the owner removes what it has sent.
     [[nodiscard]] std::string& encrypted() noexcept { return encrypted_; }
 
-    /// Continues the handshake.
+    /// Begins or continues the handshake.
     status shake_hands(boost::system::error_code& why);
     /// After the handshake: the Ed25519 key that the peer has proved to have.
     [[nodiscard]] const security::public_key& peer_key() const noexcept { return peer_key_; }
@@ -56,16 +59,20 @@ class tls_engine {
   private:
     friend struct engine_bio;
 
+    [[nodiscard]] bool begin();
     status status_of(int result, boost::system::error_code& why);
     [[nodiscard]] bool note_peer_key();
 
     struct free_ssl {
         void operator()(ssl_st* ssl) const noexcept;
     };
-    std::unique_ptr<ssl_st, free_ssl> ssl_;
+    const tls_context& shared_;
+    role role_;
+    std::unique_ptr<ssl_st, free_ssl> ssl_; // null: the handshake has not begun
     security::public_key peer_key_{};
     std::unique_ptr<char[]> input_;
     std::size_t capacity_ = 0;
+    std::size_t max_input_ = 16384;
     std::size_t begin_ = 0;
     std::size_t end_ = 0;
     std::string encrypted_;

@@ -174,6 +174,7 @@ class tls_codec final : public transport::stream_codec {
         case admission::verdict::admitted:
             rest_ = lines_->unfinished();
             lines_.reset();
+            engine_.admit();
             observe_roster();
             return status::done;
         case admission::verdict::refused: break;
