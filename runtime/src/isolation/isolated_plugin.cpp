@@ -360,10 +360,10 @@ void isolated_plugin::log(log_level level, std::string_view text) { log_(level, 
 
 // What the process says may be too much.
 void isolated_plugin::log_output(log_level level, std::string_view text, const responder* job) {
-    if (!budget_.take(clock::now())) {
+    if (!log_rate_.take(clock::now())) {
         return;
     }
-    if (const auto dropped = budget_.take_dropped(); dropped != 0) {
+    if (const auto dropped = log_rate_.take_dropped(); dropped != 0) {
         log(log_level::warning, std::to_string(dropped) + " entries of its log came too fast, and were dropped");
     }
     job != nullptr ? job->log(level, text) : log(level, text);

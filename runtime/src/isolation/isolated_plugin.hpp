@@ -3,7 +3,7 @@
 
 #include <cles/service.hpp>
 
-#include "isolation/log_budget.hpp"
+#include "isolation/log_rate.hpp"
 #include "isolation/plugin_session.hpp"
 #include "isolation/restart_policy.hpp"
 #include "jobs/job_pool.hpp"
@@ -81,7 +81,7 @@ class isolated_plugin : public std::enable_shared_from_this<isolated_plugin> {
     const session_options session_options_;
     std::string name_; // the path until it is known
     restart_policy policy_;
-    log_budget budget_;
+    log_rate log_rate_;
     std::vector<offered_task> offered_;
     std::shared_ptr<plugin_session> starting_; // until it has started
     // When its start takes too long, or has to be tried again. Not held after the end, as by a session.

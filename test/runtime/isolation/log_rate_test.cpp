@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "isolation/log_budget.hpp"
+#include "isolation/log_rate.hpp"
 
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
 
-BOOST_AUTO_TEST_SUITE(log_budget)
+BOOST_AUTO_TEST_SUITE(log_rate)
 
 using namespace std::chrono_literals;
-using budget = cles::runtime::log_budget;
+using rate = cles::runtime::log_rate;
 
 namespace {
 
 cles::time_point at(std::chrono::milliseconds since) { return cles::time_point{1h} + since; }
 
-int taken(budget& from, cles::time_point now, int wanted) {
+int taken(rate& from, cles::time_point now, int wanted) {
     int count = 0;
     for (int i = 0; i < wanted; ++i) {
         count += from.take(now) ? 1 : 0;
@@ -25,14 +25,14 @@ int taken(budget& from, cles::time_point now, int wanted) {
 } // namespace
 
 BOOST_AUTO_TEST_CASE(a_burst_passes_and_the_rest_is_counted) {
-    budget b;
+    rate b;
     BOOST_TEST(taken(b, at(0s), 1000) == 200);
     BOOST_TEST(b.take_dropped() == 800);
     BOOST_TEST(b.take_dropped() == 0);
 }
 
 BOOST_AUTO_TEST_CASE(entries_are_earned_with_time) {
-    budget b;
+    rate b;
     taken(b, at(0s), 1000);
     BOOST_TEST(taken(b, at(9ms), 10) == 0);
     BOOST_TEST(taken(b, at(10ms), 10) == 1);
@@ -41,7 +41,7 @@ BOOST_AUTO_TEST_CASE(entries_are_earned_with_time) {
 }
 
 BOOST_AUTO_TEST_CASE(slow_entries_all_pass) {
-    budget b;
+    rate b;
     for (int i = 0; i < 10'000; ++i) {
         BOOST_TEST(b.take(at(i * 10ms)));
     }

@@ -11,7 +11,7 @@
 namespace cles::runtime {
 
 /// How many entries a plugin's process may add to the daemon's log: a burst, then so many a second.
-class log_budget {
+class log_rate {
   public:
     static constexpr std::int64_t burst = 200;
     static constexpr std::chrono::milliseconds interval{10}; // of one entry
