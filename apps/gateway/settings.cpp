@@ -4,6 +4,7 @@
 #include <cles/gossip.hpp>
 #include <cles/routing.hpp>
 #include <cles/tracing.hpp>
+#include <cles/url.hpp>
 #ifdef CLES_FEDERATION
 #include <cles/federation.hpp>
 #endif
@@ -15,12 +16,10 @@
 #include "output/errors.hpp"
 
 #include <boost/asio/ip/address.hpp>
+#include <boost/system/system_error.hpp>
 
-#include <charconv>
-#include <cstdint>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 namespace gateway {
@@ -33,22 +32,14 @@ constexpr std::size_t most_kept_bytes = 65'536;
 constexpr std::size_t longest_line = 8U << 20U;
 
 boost::asio::ip::tcp::endpoint endpoint_of(const std::string& text) {
-    const auto colon = text.rfind(':');
-    std::uint16_t port = 0;
-    const auto* const end = text.data() + text.size();
-    const auto* const digits = colon == std::string::npos ? end : text.data() + colon + 1;
-    const auto [rest, code] = std::from_chars(digits, end, port);
-    auto host = text.substr(0, colon);
-    if (host.starts_with('[') && host.ends_with(']')) {
-        host = host.substr(1, host.size() - 2);
+    try {
+        const auto where = cles::parse_url("tcp://" + text);
+        if (text.ends_with(":" + std::to_string(where.port))) {
+            return {boost::asio::ip::make_address(where.host), where.port};
+        }
+    } catch (const boost::system::system_error&) { // it is not valid
     }
-    boost::system::error_code failed;
-    const auto address = boost::asio::ip::make_address(host, failed);
-    if (failed || digits == end || code != std::errc{} || rest != end) {
-        throw tool::usage_error("--http '" + text +
-                                "': write an address and a port, as in 127.0.0.1:25380 or [::1]:25380");
-    }
-    return {address, port};
+    throw tool::usage_error("--http '" + text + "': write an address and a port, as in 127.0.0.1:25380 or [::1]:25380");
 }
 
 void check_origin_option(const std::string& text) {

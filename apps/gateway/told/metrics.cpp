@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "gateway/told/metrics.hpp"
 
+#include <cles/convert.hpp>
 #include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>
 
@@ -112,14 +113,7 @@ void append_sample(std::string& out, const metric& of, std::string_view node, st
                    const told_value& value) {
     out.append(of.name).append(of.kind == "summary" && label.empty() ? "_count" : "");
     out.append("{node=\"").append(escaped_label(node)).append(label.empty() ? "\"" : "\",").append(label).append("} ");
-    if (of.scale == 1) {
-        out.append(value.text);
-    } else {
-        std::string scaled;
-        cles::json_writer{scaled}.value(value.number * of.scale);
-        out.append(scaled);
-    }
-    out.append("\n");
+    out.append(of.scale == 1 ? value.text : cles::to_json(value.number * of.scale)).append("\n");
 }
 
 } // namespace

@@ -4,6 +4,8 @@
 #include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>
 
+#include "gateway/http/message.hpp"
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -24,15 +26,8 @@ std::string epoch_text(std::uint32_t epoch) {
 
 // {"node":"car1","update":VALUE}
 std::string of_node(std::string_view node, std::string_view key, std::string_view json) {
-    std::string out;
-    cles::json_writer w{out};
-    w.begin_object();
-    w.plain_key("node");
-    w.value(node);
-    w.key(key);
-    w.raw(json);
-    w.end_object();
-    return out;
+    auto out = R"({"node":)" + json_string(node) + ",\"";
+    return out.append(key).append("\":").append(json).append("}");
 }
 
 // The values, or failures, in the reply to a BIND of `all`: an event for each node.
@@ -106,28 +101,15 @@ void update_events::take(const cles::feed_item<cles::json_text>& item, std::stri
         take_value(item, out);
         return;
     }
-    std::string data;
-    cles::json_writer w{data};
-    w.begin_object();
+    const bool is_named = is_of_all_ && !item.publisher.empty();
+    const auto of = is_named ? R"(,"node":)" + json_string(item.publisher) : std::string{};
     switch (item.kind) {
     case cles::feed_event::current:
     case cles::feed_event::update: return; // values
     case cles::feed_event::gap:
-        w.plain_key("missed");
-        w.value(item.missed);
-        if (is_of_all_ && !item.publisher.empty()) {
-            w.plain_key("node");
-            w.value(std::string_view{item.publisher});
-        }
-        w.end_object();
-        append_event(out, "gap", {}, data);
+        append_event(out, "gap", {}, R"({"missed":)" + std::to_string(item.missed) + of + "}");
         return;
-    case cles::feed_event::lost:
-        w.plain_key("reason");
-        w.value(std::string_view{item.text});
-        w.end_object();
-        append_event(out, "lost", {}, data);
-        return;
+    case cles::feed_event::lost: append_event(out, "lost", {}, R"({"reason":)" + json_string(item.text) + "}"); return;
     case cles::feed_event::rebound: append_event(out, "rebound", {}, "{}"); return;
     }
 }
