@@ -78,6 +78,22 @@ def finish(process):
     return process.returncode, out, err
 
 
+def inherited_descriptors(pid):
+    """What a program that the process starts would inherit, besides the standard streams: all descriptors without
+    close-on-exec."""
+    found = []
+    for entry in sorted(os.listdir(f"/proc/{pid}/fd"), key=int):
+        try:
+            target = os.readlink(f"/proc/{pid}/fd/{entry}")
+            with open(f"/proc/{pid}/fdinfo/{entry}", encoding="utf-8") as info:
+                flags = next(int(line.split()[1], 8) for line in info if line.startswith("flags:"))
+        except FileNotFoundError:  # closed meanwhile
+            continue
+        if int(entry) > 2 and not flags & os.O_CLOEXEC:
+            found.append(f"{entry} {target}")
+    return found
+
+
 def free_port():
     """An unused UDP port, for a separate multicast group of the test."""
     with socket.socket(type=socket.SOCK_DGRAM) as probe:

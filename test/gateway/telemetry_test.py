@@ -4,6 +4,7 @@
 
 import http.server
 import json
+import os
 import re
 import shutil
 import signal
@@ -11,19 +12,22 @@ import socket
 import subprocess
 import tempfile
 import threading
+import time
 import unittest
 import urllib.error
 import urllib.request
 from pathlib import Path
 
-from gateway_support import FakeNodes, Gateway, own_group
-from support import PATIENCE, Node, wait_until
+from gateway_support import Events, FakeNodes, Gateway, own_group
+from support import PATIENCE, Node, environment, inherited_descriptors, wait_until
 
 try:
     from openapi_spec_validator import OpenAPIV31SpecValidator
 except ImportError:
     OpenAPIV31SpecValidator = None
 
+# Preloaded, it makes lookups of some names hang.
+SLOW_NAMES = os.environ.get("SLOW_NAMES", "")
 TRACE = "0af7651916cd43dd8448eb211c80319c"
 SAMPLE = re.compile(r'([a-z_]+)\{node="([^"]+)"((?:,[a-z]+="[^"]*")*)\} (\S+)')
 
@@ -189,6 +193,79 @@ class Telemetry(unittest.TestCase):
         self.gateway.get("/pull/car1/echo/3", Traceparent=f"00-{other}-b7ad6b7169203331-01")
         wait_until(lambda: other in told(), "the next one is told")
         self.assertNotIn(silent, told())
+
+
+class Collectors(unittest.TestCase):
+    """Collectors that are not there."""
+
+    @unittest.skipUnless(SLOW_NAMES, "a sanitizer has to be the first library of a process")
+    def test_it_stops_at_once_while_a_name_is_looked_up(self):
+        gateway = self.gateway_with_slow_name()
+        begun = time.monotonic()
+        self.assertEqual(gateway.stop(), 0)
+        self.assertLess(time.monotonic() - begun, 3)
+
+    @unittest.skipUnless(SLOW_NAMES, "a sanitizer has to be the first library of a process")
+    def test_a_lookup_that_never_ends_is_given_up_and_not_begun_again(self):
+        gateway = self.gateway_with_slow_name()
+        self.addCleanup(gateway.stop)
+        wait_until(lambda: "could not be looked up in time" in gateway.errors(), "it is given up")
+        self.assertGreater(gateway.counted("spans_dropped"), 0)
+        threads = len(os.listdir(f"/proc/{gateway.process.pid}/task"))
+        gateway.get("/pull/self/cles")
+        dropped = gateway.counted("spans_dropped")
+        wait_until(lambda: gateway.counted("spans_dropped") > dropped, "the next ones, too")
+        self.assertEqual(gateway.errors().count("is being looked up"), 1)
+        self.assertEqual(len(os.listdir(f"/proc/{gateway.process.pid}/task")), threads)
+
+    def gateway_with_slow_name(self):
+        gateway = Gateway("--otlp", "http://collector.slow.test", env=environment(LD_PRELOAD=SLOW_NAMES))
+        gateway.get("/pull/self/cles")
+        wait_until(lambda: "collector.slow.test is being looked up" in gateway.errors(), "the lookup has begun")
+        return gateway
+
+    def test_a_name_that_nobody_has_costs_only_the_spans(self):
+        gateway = Gateway("--otlp", "http://nobody.invalid:1", env=environment())
+        self.addCleanup(gateway.stop)
+        gateway.get("/pull/self/cles")
+        wait_until(lambda: "the collector at http://nobody.invalid:1 does not take spans: " in gateway.errors(), "it is told")
+        self.assertGreater(gateway.counted("spans_dropped"), 0)
+
+    def test_one_that_refuses_is_told_of(self):
+        for reply, words in ((b"HTTP/1.1 503 Busy\r\n\r\n", "it replies HTTP/1.1 503 Busy"),
+                             (b"", "it ends the connection without a reply")):
+            with socket.create_server(("127.0.0.1", 0)) as collector:
+                collector.settimeout(PATIENCE)
+                gateway = Gateway("--otlp", f"http://127.0.0.1:{collector.getsockname()[1]}/here", env=environment())
+                self.addCleanup(gateway.stop)
+                gateway.get("/pull/self/cles")
+                taken, _ = collector.accept()
+                with taken, taken.makefile("rb") as lines:
+                    self.assertEqual(lines.readline(), b"POST /here HTTP/1.1\r\n")
+                    while lines.readline() != b"\r\n":
+                        pass
+                    taken.sendall(reply)
+                    taken.shutdown(socket.SHUT_WR)
+                    wait_until(lambda g=gateway, w=words: w in g.errors(), "it is told")
+                self.assertGreater(gateway.counted("spans_dropped"), 0)
+
+    def test_no_program_inherits_a_descriptor(self):
+        env = own_group()
+        node = Node("--multicast", env["CLES_MULTICAST"])
+        self.addCleanup(node.stop)
+        with socket.create_server(("127.0.0.1", 0)) as collector:
+            collector.settimeout(PATIENCE)
+            gateway = Gateway("--otlp", f"http://127.0.0.1:{collector.getsockname()[1]}", "--listen", "tcp://127.0.0.1:0",
+                              "--listen", "udp://127.0.0.1:0", env=env)
+            self.addCleanup(gateway.stop)
+            wait_until(lambda: "car1" in json.loads(gateway.get("/pull/all/cles").body)["results"], "they know each other")
+            with gateway.raw(), Events(gateway, "/bind/car1/localization") as events:
+                self.assertIsNotNone(events.next())
+                taken, _ = collector.accept()
+                with taken:
+                    gateway.get("/pull/car1/echo/1")
+                    self.assertEqual(Path(f"/proc/{gateway.process.pid}/comm").read_text(), "cles-gateway\n")
+                    self.assertEqual(inherited_descriptors(gateway.process.pid), [])
 
 
 class LargeFleet(unittest.TestCase):

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "discovery/host.hpp"
 #include "doctor/checks.hpp"
+#include "system/private_socket.hpp"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
@@ -17,7 +18,6 @@
 #include <string>
 #include <string_view>
 
-#include <fcntl.h>
 #include <net/if.h>
 #include <netinet/in.h>
 #include <poll.h>
@@ -46,9 +46,8 @@ class group_probe {
         membership.imr_multiaddr.s_addr = htonl(group_.address().to_v4().to_uint());
         membership.imr_ifindex = static_cast<int>(::if_nametoindex(interface.c_str()));
 
-        for (const auto* each : {&listener_, &sender_}) { // no program that is started here inherits them
-            ::fcntl(const_cast<udp::socket*>(each)->native_handle(), F_SETFD, FD_CLOEXEC);
-        }
+        open_private(listener_, udp::v4());
+        open_private(sender_, udp::v4());
         listener_.set_option(asio::socket_base::reuse_address{true});
         step = "listen at udp port " + std::to_string(options.port);
         listener_.bind(group_);
@@ -96,8 +95,8 @@ class group_probe {
 
     asio::io_context io_;
     udp::endpoint group_;
-    udp::socket listener_{io_, udp::v4()};
-    udp::socket sender_{io_, udp::v4()};
+    udp::socket listener_{io_};
+    udp::socket sender_{io_};
 };
 
 std::string advice_on(const boost::system::error_code& code, const cles::multicast_options& group,

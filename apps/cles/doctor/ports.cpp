@@ -6,6 +6,7 @@
 #include "client/client.hpp"
 #include "discovery/host.hpp"
 #include "doctor/checks.hpp"
+#include "system/private_socket.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/address_v4.hpp>
@@ -18,8 +19,6 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
-
-#include <fcntl.h>
 
 namespace tool {
 
@@ -88,8 +87,7 @@ template <class Protocol>
 boost::system::error_code try_to_bind(asio::io_context& io) {
     boost::system::error_code code;
     typename Protocol::socket socket{io};
-    socket.open(Protocol::v4(), code);
-    ::fcntl(socket.native_handle(), F_SETFD, FD_CLOEXEC);
+    open_private(socket, Protocol::v4(), code);
     if constexpr (std::same_as<Protocol, asio::ip::tcp>) {
         socket.set_option(asio::socket_base::reuse_address{true}, code); // as nodes do; it allows no second listener
     }

@@ -3,13 +3,13 @@
 
 #include <cles/error.hpp>
 
+#include "system/private_socket.hpp"
+
 #include <boost/asio/ip/v6_only.hpp>
 #include <boost/system/system_error.hpp>
 
 #include <chrono>
 #include <utility>
-
-#include <fcntl.h>
 
 namespace gateway {
 namespace asio = boost::asio;
@@ -17,12 +17,6 @@ using asio::ip::tcp;
 using boost::system::error_code;
 
 namespace {
-
-// Programs that this one might start do not inherit it.
-template <class Socket>
-void keep_private(Socket& socket) {
-    static_cast<void>(::fcntl(socket.native_handle(), F_SETFD, FD_CLOEXEC));
-}
 
 std::string url_text(const tcp::endpoint& where, bool is_tls) {
     const auto address = where.address().to_string();
@@ -33,16 +27,16 @@ std::string url_text(const tcp::endpoint& where, bool is_tls) {
 } // namespace
 
 std::string http_server::listen(const tcp::endpoint& where) {
-    auto& made = listeners_.emplace_back(io_);
+    auto& made = listeners_.emplace_back(io_, where.protocol());
     try {
-        made.acceptor.open(where.protocol());
-        keep_private(made.acceptor);
+        tool::open_private(made.acceptor, where.protocol());
         made.acceptor.set_option(tcp::acceptor::reuse_address{true});
         if (where.protocol() == tcp::v6()) {
             made.acceptor.set_option(asio::ip::v6_only{true});
         }
         made.acceptor.bind(where);
         made.acceptor.listen();
+        made.acceptor.native_non_blocking(true);
     } catch (const boost::system::system_error& e) {
         throw cles::error(e.code(), "cannot listen at " + url_text(where, tls_ != nullptr));
     }
@@ -51,12 +45,18 @@ std::string http_server::listen(const tcp::endpoint& where) {
 }
 
 void http_server::accept(listener& at) {
-    at.acceptor.async_accept([this, &at](error_code code, tcp::socket socket) {
-        if (code == asio::error::operation_aborted) {
+    at.acceptor.async_wait(tcp::acceptor::wait_read, [this, &at](error_code code) {
+        if (!at.acceptor.is_open()) {
             return;
+        }
+        tcp::socket socket{io_};
+        if (!code) {
+            tool::accept_private(at.acceptor, at.protocol, socket, code);
         }
         if (!code) {
             take(std::move(socket));
+        }
+        if (!code || code == asio::error::try_again) {
             accept(at);
             return;
         }
@@ -82,7 +82,6 @@ void http_server::take(tcp::socket socket) {
     if (code) {
         return;
     }
-    keep_private(socket);
     socket.set_option(tcp::no_delay{true}, code);
     const auto admitted = limits_.admit(client_address(from.address().to_string()));
     if (admitted.evicted) {

@@ -40,7 +40,8 @@ class http_server {
 
   private:
     struct listener {
-        explicit listener(boost::asio::io_context& io) : acceptor(io), pause(io) {}
+        listener(boost::asio::io_context& io, boost::asio::ip::tcp of) : protocol(of), acceptor(io), pause(io) {}
+        boost::asio::ip::tcp protocol;
         boost::asio::ip::tcp::acceptor acceptor;
         boost::asio::steady_timer pause;
     };

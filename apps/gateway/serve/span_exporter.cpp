@@ -3,18 +3,15 @@
 
 #include <cles/convert.hpp>
 #include <cles/error.hpp>
+#include <cles/limits.hpp>
+#include <cles/link.hpp>
 
 #include "gateway/access/tokens.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
-#include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/asio/connect.hpp>
 #include <boost/asio/detached.hpp>
-#include <boost/asio/ip/tcp.hpp>
-#include <boost/asio/read_until.hpp>
-#include <boost/asio/use_awaitable.hpp>
-#include <boost/asio/write.hpp>
+#include <boost/system/error_code.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -25,13 +22,14 @@
 namespace gateway {
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
-using asio::ip::tcp;
+using boost::system::error_code;
 
 namespace {
 
+constexpr std::string_view scheme = "http://";
 constexpr auto pause_between = 1s;
 constexpr auto patience_with_node = 1s;
-constexpr auto patience_with_collector = 5s;
+constexpr auto patience_with_collector = 5s; // until it is connected, and again until it replies
 constexpr std::size_t most_waiting = 4096;
 constexpr std::size_t most_at_once = 1024;
 constexpr std::size_t most_collections = 8; // in progress; of other requests, only the gateway's own span is told
@@ -43,56 +41,105 @@ std::int64_t unix_ns() {
         .count();
 }
 
-/// A connection to the collector, and how long it may take. The timer may have ended when it is cancelled.
-struct attempt {
-    explicit attempt(const asio::any_io_executor& executor) : socket(executor), resolver(executor), limit(executor) {}
-    tcp::socket socket;
-    tcp::resolver resolver;
-    asio::steady_timer limit;
-};
-
 std::string request_text(const collector_address& to, const std::string& document) {
-    const auto host = to.host.find(':') == std::string::npos ? to.host : "[" + to.host + "]";
-    return "POST " + to.path + " HTTP/1.1\r\nHost: " + host + ":" + to.port +
+    return "POST " + to.path + " HTTP/1.1\r\nHost: " + cles::to_string(to.at).substr(scheme.size()) +
            "\r\nContent-Type: application/json\r\nConnection: close\r\nContent-Length: " +
            std::to_string(document.size()) + "\r\n\r\n" + document;
 }
 
 } // namespace
 
+/// A request to the collector, by a link of the library, whose lookup nothing waits for and whose socket no program
+/// inherits.
+class span_exporter::delivery final : public cles::link_events, public std::enable_shared_from_this<delivery> {
+  public:
+    /// \param done called once: why the collector has not taken it; empty if it has
+    delivery(const asio::any_io_executor& executor, std::function<void(const std::string&)> done)
+        : limit_(executor), done_(std::move(done)) {}
+
+    void start(const cles::url& to, std::string request) {
+        cles::limits bounds;
+        bounds.connect = patience_with_collector;
+        bounds.line = longest_status_line;
+        auto connected = [self = shared_from_this(), request = std::move(request)](error_code code,
+                                                                                   cles::link_ptr made) {
+            self->link_ = std::move(made);
+            if (code) {
+                self->end(code.message());
+                return;
+            }
+            self->limit_.expires_after(patience_with_collector);
+            self->limit_.async_wait([self](error_code cancelled) {
+                if (!cancelled) {
+                    self->end("it does not reply in time");
+                }
+            });
+            self->link_->start(self);
+            self->link_->output() = request;
+            self->link_->flush();
+        };
+        give_up_ = cles::find_transport("tcp")->dial(limit_.get_executor(), to, bounds, std::move(connected));
+    }
+    void close() {
+        done_ = nullptr;
+        limit_.cancel();
+        give_up_();
+        if (link_) {
+            link_->close();
+        }
+    }
+
+    void on_line(std::string_view line) override {
+        const auto status = line.substr(0, line.find('\r'));
+        const auto code = status.substr(std::min(status.find(' ') + 1, status.size()));
+        end(code.starts_with('2') ? std::string{} : "it replies " + std::string{status});
+    }
+    void on_overlong(std::string_view head) override { on_line(head); }
+    void on_batch() override {}
+    void on_end() override { end("it ends the connection without a reply"); }
+    void on_lost(error_code why) override { end(why.message()); }
+    void on_writable() override {}
+
+  private:
+    void end(const std::string& why) {
+        const auto self = shared_from_this();
+        if (const auto done = std::exchange(done_, nullptr)) {
+            close();
+            done(why);
+        }
+    }
+
+    asio::steady_timer limit_;
+    std::function<void(const std::string&)> done_;
+    std::function<void()> give_up_;
+    cles::link_ptr link_;
+};
+
 collector_address collector_at(const std::string& url) {
-    constexpr std::string_view scheme = "http://";
-    if (!url.starts_with(scheme)) {
+    const auto slash = std::min(url.find('/', scheme.size()), url.size());
+    auto at = url.substr(0, slash);
+    if (!url.starts_with(scheme) || at.find('?') != std::string::npos ||
+        url.find_first_of(" \r\n") != std::string::npos) {
         throw std::runtime_error("'" + url +
                                  "': write http://HOST:PORT, where a collector is on a network that is trusted");
     }
-    const auto rest = url.substr(scheme.size());
-    const auto slash = std::min(rest.find('/'), rest.size());
-    const auto authority = rest.substr(0, slash);
-    const auto bracket = authority.starts_with('[') ? authority.find(']') : std::size_t{0};
-    const auto colon = bracket == std::string::npos ? std::string::npos : authority.find(':', bracket);
-    auto host = authority.substr(0, colon);
-    auto port = colon == std::string::npos ? std::string{"4318"} : authority.substr(colon + 1);
-    if (host.starts_with('[') && host.ends_with(']')) {
-        host = host.substr(1, host.size() - 2);
+    if (at.find(':', std::max(scheme.size(), at.find(']') + 1)) == std::string::npos) {
+        at += ":4318";
     }
-    if (host.empty() || port.empty() || port.find_first_not_of("0123456789") != std::string::npos ||
-        url.find_first_of(" \r\n") != std::string::npos) {
-        throw std::runtime_error("'" + url + "' is not a URL such as http://127.0.0.1:4318");
-    }
-    const auto path = rest.substr(slash);
-    return {.host = std::move(host), .port = std::move(port), .path = path.size() > 1 ? path : "/v1/traces"};
+    const auto path = url.substr(slash);
+    return {.at = cles::parse_url(at), .path = path.size() > 1 ? path : "/v1/traces"};
 }
 
 span_exporter::span_exporter(cles::service& node, collector_address where, gateway_counts& counts,
                              std::function<void(const std::string&)> log)
     : node_(&node), where_(std::move(where)), counts_(counts), log_(std::move(log)), timer_(node.get_executor()) {}
 
-void span_exporter::start() { asio::co_spawn(node_->get_executor(), run(shared_from_this()), asio::detached); }
-
 void span_exporter::stop() {
     node_ = nullptr;
     timer_.cancel();
+    if (const auto stopped = std::exchange(sending_, nullptr)) {
+        stopped->close();
+    }
 }
 
 span_exporter::begun span_exporter::begin(const trace_parent& parent, std::string name) const {
@@ -156,56 +203,43 @@ asio::awaitable<void> span_exporter::collect(std::shared_ptr<span_exporter> self
     --self->collecting_;
 }
 
-asio::awaitable<void> span_exporter::run(std::shared_ptr<span_exporter> self) {
-    while (self->node_ != nullptr) {
-        self->timer_.expires_after(pause_between);
-        try {
-            co_await self->timer_.async_wait(asio::use_awaitable);
-        } catch (const boost::system::system_error&) {
-            co_return;
-        }
-        while (!self->waiting_.empty() && self->node_ != nullptr) {
-            const auto count = std::min(self->waiting_.size(), most_at_once);
-            const auto end = self->waiting_.begin() + static_cast<std::ptrdiff_t>(count);
-            const std::vector<traced_span> batch(self->waiting_.begin(), end);
-            self->waiting_.erase(self->waiting_.begin(), end);
-            co_await self->send(otlp_document(batch), count);
-        }
-    }
-}
-
-asio::awaitable<void> span_exporter::send(std::string document, std::size_t count) {
-    const auto made = std::make_shared<attempt>(timer_.get_executor());
-    made->limit.expires_after(patience_with_collector);
-    made->limit.async_wait([made](boost::system::error_code code) {
+void span_exporter::send_later() {
+    timer_.expires_after(pause_between);
+    timer_.async_wait([self = shared_from_this()](error_code code) {
         if (!code) {
-            boost::system::error_code ignored;
-            made->resolver.cancel();
-            made->socket.close(ignored);
+            self->send();
         }
     });
-    const auto text = request_text(where_, document);
-    std::string reply;
-    std::string why;
-    try {
-        const auto found = co_await made->resolver.async_resolve(where_.host, where_.port, asio::use_awaitable);
-        co_await asio::async_connect(made->socket, found, asio::use_awaitable);
-        co_await asio::async_write(made->socket, asio::buffer(text), asio::use_awaitable);
-        auto line = asio::dynamic_buffer(reply, longest_status_line);
-        co_await asio::async_read_until(made->socket, line, '\n', asio::use_awaitable);
-        const auto status = std::string_view{reply}.substr(0, reply.find('\r'));
-        const auto code = status.substr(std::min(status.find(' ') + 1, status.size()));
-        why = code.starts_with('2') ? std::string{} : "it replies " + std::string{status};
-    } catch (const boost::system::system_error& e) {
-        why = e.code().message();
+}
+
+void span_exporter::send() {
+    if (node_ == nullptr) {
+        return;
     }
-    made->limit.cancel();
+    if (waiting_.empty()) {
+        send_later();
+        return;
+    }
+    const auto count = std::min(waiting_.size(), most_at_once);
+    const auto end = waiting_.begin() + static_cast<std::ptrdiff_t>(count);
+    const auto document = otlp_document({waiting_.begin(), end});
+    waiting_.erase(waiting_.begin(), end);
+    sending_ =
+        std::make_shared<delivery>(timer_.get_executor(), [self = shared_from_this(), count](const std::string& why) {
+            self->on_sent(count, why);
+        });
+    sending_->start(where_.at, request_text(where_, document));
+}
+
+void span_exporter::on_sent(std::size_t count, const std::string& why) {
     (why.empty() ? counts_.spans_sent : counts_.spans_dropped) += count;
     const auto now = std::chrono::steady_clock::now();
     if (!why.empty() && (logged_ == std::chrono::steady_clock::time_point{} || now - logged_ > 1min)) {
         logged_ = now;
-        log_("the collector at " + where_.host + ":" + where_.port + " does not take spans: " + why);
+        log_("the collector at " + cles::to_string(where_.at) + " does not take spans: " + why);
     }
+    sending_ = nullptr;
+    send();
 }
 
 } // namespace gateway

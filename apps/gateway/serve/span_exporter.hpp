@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/service.hpp>
+#include <cles/url.hpp>
 
 #include "gateway/serve/exchange.hpp"
 #include "gateway/told/spans.hpp"
@@ -22,11 +23,11 @@ namespace gateway {
 
 /// Where a collector of OpenTelemetry takes spans, by OTLP/HTTP.
 struct collector_address {
-    std::string host;
-    std::string port;
+    cles::url at;
     std::string path;
 };
-/// Reads "http://127.0.0.1:4318"; without a path, it is /v1/traces. \throws std::runtime_error that says what is wrong
+/// Reads "http://127.0.0.1:4318"; without a path, it is /v1/traces.
+/// \throws std::runtime_error or cles::error, which say what is wrong
 collector_address collector_at(const std::string& url);
 
 /// Sends the spans of the requests that enter by the gateway to a collector. What it does not take is dropped.
@@ -44,13 +45,16 @@ class span_exporter : public std::enable_shared_from_this<span_exporter> {
     /// It has ended: asks the nodes that have served it for their spans.
     void end(begun what, std::string_view outcome);
 
-    void start();
+    void start() { send_later(); }
     void stop();
 
   private:
+    class delivery;
+
     static boost::asio::awaitable<void> collect(std::shared_ptr<span_exporter> self, std::shared_ptr<begun> what);
-    static boost::asio::awaitable<void> run(std::shared_ptr<span_exporter> self);
-    boost::asio::awaitable<void> send(std::string document, std::size_t count);
+    void send_later();
+    void send();
+    void on_sent(std::size_t count, const std::string& why);
     void add(const std::string& trace, placed_span span);
 
     cles::service* node_; // null: stopped
@@ -59,6 +63,7 @@ class span_exporter : public std::enable_shared_from_this<span_exporter> {
     std::function<void(const std::string&)> log_;
     boost::asio::steady_timer timer_;
     std::vector<traced_span> waiting_;
+    std::shared_ptr<delivery> sending_;
     std::size_t collecting_ = 0;
     std::chrono::steady_clock::time_point logged_{};
 };

@@ -11,7 +11,7 @@ import subprocess
 import tempfile
 import time
 
-from support import PATIENCE, environment, finish, read_line
+from support import PATIENCE, environment, finish, inherited_descriptors, read_line
 
 CLESD = os.environ.get("CLESD", "clesd")
 # Plugins with one fault each, and one whose tasks misbehave.
@@ -119,19 +119,7 @@ class Daemon(Folder):
             return link.ask(line)
 
     def inherited(self):
-        """What a program that it starts would inherit, besides the standard streams: all descriptors without
-        close-on-exec."""
-        found = []
-        for entry in sorted(os.listdir(f"/proc/{self.process.pid}/fd"), key=int):
-            try:
-                target = os.readlink(f"/proc/{self.process.pid}/fd/{entry}")
-                with open(f"/proc/{self.process.pid}/fdinfo/{entry}", encoding="utf-8") as info:
-                    flags = next(int(line.split()[1], 8) for line in info if line.startswith("flags:"))
-            except FileNotFoundError:  # closed meanwhile
-                continue
-            if int(entry) > 2 and not flags & os.O_CLOEXEC:
-                found.append(f"{entry} {target}")
-        return found
+        return inherited_descriptors(self.process.pid)
 
     def send_signal(self, number):
         self.process.send_signal(number)
