@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "image_set.hpp"
 
+#include <array>
 #include <charconv>
-#include <fstream>
-#include <iterator>
+#include <cstdio>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -73,6 +74,20 @@ file_header read_header(std::string_view line) {
     return out;
 }
 
+// Programs that other threads start meanwhile do not inherit the file.
+std::string text_of(const std::string& name) {
+    const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file{std::fopen(name.c_str(), "re"), &std::fclose};
+    if (!file) {
+        throw std::invalid_argument(name + ": it cannot be read");
+    }
+    std::string text;
+    std::array<char, 65'536> some{};
+    while (const auto count = std::fread(some.data(), 1, some.size(), file.get())) {
+        text.append(some.data(), count);
+    }
+    return text;
+}
+
 } // namespace
 
 image_set::image_set(const file_header& like) : header_(like) {
@@ -137,12 +152,7 @@ image_set image_set::parse(std::string_view text, const std::string& name) {
 image_set image_set::read(const std::vector<std::string>& files) {
     std::optional<image_set> all;
     for (const auto& name : files) {
-        std::ifstream file{name, std::ios::binary};
-        if (!file) {
-            throw std::invalid_argument(name + ": it cannot be read");
-        }
-        const std::string text{std::istreambuf_iterator<char>{file}, {}};
-        auto images = parse(text, name);
+        auto images = parse(text_of(name), name);
         if (!all) {
             all = std::move(images);
             continue;

@@ -9,10 +9,11 @@
 
 #include <chrono>
 #include <cmath>
-#include <fstream>
 #include <memory>
 #include <stdexcept>
 #include <utility>
+
+#include <unistd.h>
 
 namespace digits {
 namespace {
@@ -82,7 +83,7 @@ void settings::check() const {
         throw cles::setting_error("files", "files: at least one");
     }
     for (const auto& name : files) {
-        if (!std::ifstream{name}) {
+        if (::access(name.c_str(), R_OK) != 0) {
             throw cles::setting_error("files", name + ": it cannot be read");
         }
     }

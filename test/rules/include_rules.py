@@ -149,9 +149,10 @@ INHERITED = [
                 re.DOTALL), "close-on-exec is missing"),
     (re.compile(r"(?<![\w>])::(dup|pipe|accept)\s*\("), "programs that are started inherit it: use a function that sets close-on-exec"),
 ]
+INHERITING_HEADERS = re.compile(r"fstream$")
 INHERITED_LAYERS = LIBRARY | {"programs", "runtime", "apps", "plugins"}
 INHERITED_OF_ASIO = re.compile(r"\basync_accept\b|\bacceptor_?\.accept\(|\.open\([^;]*(protocol\(\)|::v[46]\(\))"
-                               r"|(?<!make_private<udp::socket>)[({]\w+, *(\w+::)*(udp|tcp)::v[46]\(\)")
+                               r"|(?<!make_private<udp::socket>)(?<!open_private)[({]\w+, *(\w+::)*(udp|tcp)::v[46]\(\)")
 
 # What looks up names waits for them as long as the system does.
 LOOKUP = re.compile(r"\b(async_resolve|getaddrinfo|gethostbyname)\b|::resolver\b")
@@ -311,6 +312,9 @@ class Tree:
         for pattern, allowed, what in RESERVED_HEADERS:
             if pattern.match(header) and not allowed.match(name):
                 self.complain(name, line, f"<{header}>: {what}")
+        if layer in INHERITED_LAYERS and INHERITING_HEADERS.match(header):
+            self.complain(name, line, f"<{header}>: programs that are started inherit its files: use system/whole_file.hpp, "
+                          "or std::fopen with 'e'")
         if layer in SANS_IO and NOT_SANS_IO.match(header) and header not in WITHOUT_IO.get(name, set()):
             self.complain(name, line, f"<{header}>: {layer} is sans-I/O")
         if layer == "public" and HEAVY_IN_PUBLIC.match(header):
@@ -364,14 +368,16 @@ class Tree:
                 for pattern, what in INHERITED:
                     if match := pattern.search(statement):
                         self.complain(name, line, f"'{match.group(0)[:40]}': {what}")
-        if layer in LIBRARY and name != "libcles/src/transport/private_socket.hpp":
+        private = {**dict.fromkeys(LIBRARY, "transport"), "apps": "system", "runtime": "system"}.get(layer)
+        if private and name != "libcles/src/transport/private_socket.hpp":
             for match in INHERITED_OF_ASIO.finditer(clean):
                 self.complain(name, clean.count("\n", 0, match.start()) + 1,
-                              f"'{match.group(0)}': programs that are started inherit it: use transport/private_socket.hpp")
-        if layer in LIBRARY | {"runtime"} and name != "libcles/src/transport/ip_host.cpp":
+                              f"'{match.group(0)}': programs that are started inherit it: use {private}/private_socket.hpp")
+        if (layer in LIBRARY | {"runtime"} or name.startswith("apps/gateway/")) and name != "libcles/src/transport/ip_host.cpp":
             for match in LOOKUP.finditer(clean):
                 self.complain(name, clean.count("\n", 0, match.start()) + 1,
-                              f"'{match.group(0)}': others would wait for a slow name: use transport/host_lookup.hpp")
+                              f"'{match.group(0)}': others would wait for a slow name: use transport/host_lookup.hpp, or "
+                              "a link_transport")
         if layer in LIBRARY:
             for match in CATEGORY.finditer(clean):
                 if not CATEGORY_ID.search(match["body"]):
@@ -490,6 +496,9 @@ PLANTED = [
     ("libcles/src/transport/a.cpp", "void f() { acceptor_.async_accept(g); }\n", "use transport/private_socket.hpp"),
     ("libcles/src/transport/a.cpp", "void f() { resolver_.async_resolve(g); }\n", "use transport/host_lookup.hpp"),
     ("runtime/a.cpp", "boost::asio::ip::tcp::resolver made{io};\n", "use transport/host_lookup.hpp"),
+    ("apps/gateway/a.cpp", "void f() { resolver_.async_resolve(g); }\n", "or a link_transport"),
+    ("apps/a.cpp", "void f() { socket.open(where.protocol(), code); }\n", "use system/private_socket.hpp"),
+    ("runtime/a.cpp", "#include <fstream>\n", "use system/whole_file.hpp"),
     ("libcles/src/protocol/a.cpp", "class ours final : public boost::system::error_category {\n  public:\n    int f();\n};\n",
      "without an id"),
     ("runtime/a.cpp", "int f() { return ::socket(1, 2, 0); }\n", "close-on-exec is missing"),

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "discovery/host.hpp"
 
+#include "system/whole_file.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <optional>
@@ -37,8 +38,12 @@ struct socket_entry {
 // Nothing if it cannot be read.
 std::optional<std::vector<socket_entry>> sockets_in(const std::string& table) {
     std::vector<socket_entry> out;
-    std::ifstream file{table};
+    std::string text;
     std::string line;
+    if (read_file(table, text)) {
+        return {};
+    }
+    std::istringstream file{text};
     if (!std::getline(file, line)) { // the header
         return {};
     }
@@ -214,8 +219,8 @@ std::string process_listening_at(std::string_view protocol, std::uint16_t port) 
         const bool is_process = std::all_of(number.begin(), number.end(), [](char c) { return c >= '0' && c <= '9'; });
         if (is_process && has_open(process->path(), sockets)) {
             std::string name;
-            std::getline(std::ifstream{process->path() / "comm"}, name);
-            return name.append(" (process ").append(number).append(")");
+            static_cast<void>(read_file(process->path() / "comm", name));
+            return name.substr(0, name.find('\n')).append(" (process ").append(number).append(")");
         }
     }
     return {};

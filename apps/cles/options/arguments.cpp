@@ -4,12 +4,11 @@
 #include <cles/json_reader.hpp>
 
 #include "output/errors.hpp"
+#include "system/whole_file.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cstddef>
-#include <fstream>
 #include <iostream>
 #include <iterator>
 #include <system_error>
@@ -100,18 +99,12 @@ void check_parts(std::string_view noun, stars with) {
     }
 }
 
-std::string contents_of(std::istream& in) { return {std::istreambuf_iterator<char>{in}, {}}; }
-
 std::string contents_of_file(const std::string& name) {
-    std::ifstream file{name, std::ios::binary};
-    // A directory can be opened, but not read.
-    if (!file || file.peek() == std::ifstream::traits_type::eof()) {
-        if (!file.is_open() || errno == EISDIR) {
-            throw usage_error("cannot read " + name + ": " + std::generic_category().message(errno));
-        }
-        file.clear();
+    std::string text;
+    if (const auto why = read_file(name, text)) {
+        throw usage_error("cannot read " + name + ": " + why.message());
     }
-    return contents_of(file);
+    return text;
 }
 
 } // namespace
@@ -129,7 +122,7 @@ std::string read_body(const std::string& argument) {
     std::string origin = "the body";
     if (argument == "-") {
         origin = "the body from stdin";
-        text = contents_of(std::cin);
+        text = std::string{std::istreambuf_iterator<char>{std::cin}, {}};
     } else if (argument.starts_with('@')) {
         origin = argument.substr(1);
         text = contents_of_file(origin);

@@ -3,12 +3,12 @@
 
 #include "options/user_folder.hpp"
 #include "output/errors.hpp"
+#include "system/whole_file.hpp"
 
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <stdexcept>
 #include <system_error>
 
@@ -45,15 +45,15 @@ saved_context find_used_context() {
 
 saved_contexts read_contexts() {
     const auto path = contexts_file();
-    std::ifstream file{path, std::ios::binary};
+    std::string text;
+    const auto failed = read_file(path, text);
     if (std::error_code code;
-        path.empty() || (!file && fs::symlink_status(path, code).type() == fs::file_type::not_found)) {
+        path.empty() || (failed && fs::symlink_status(path, code).type() == fs::file_type::not_found)) {
         return {};
     }
-    if (!file) { // otherwise those in it would be lost when it is replaced
+    if (failed) { // otherwise those in it would be lost when it is replaced
         throw usage_error("the contexts in " + path.string() + " cannot be read");
     }
-    const std::string text{std::istreambuf_iterator<char>{file}, {}};
     saved_contexts out;
     std::string why;
     if (!cles::from_json(text, out, &why)) {
@@ -77,12 +77,11 @@ void write_contexts(const saved_contexts& all) {
     }
     auto made = path;
     made += ".new";
-    {
-        std::ofstream file{made, std::ios::binary | std::ios::trunc};
-        file << cles::to_json(all) << '\n' << std::flush;
-        if (!file) {
-            fail(std::generic_category().message(errno));
-        }
+    const auto text = cles::to_json(all) + "\n";
+    auto* const file = std::fopen(made.c_str(), "we"); // e: close-on-exec
+    const bool is_written = file != nullptr && std::fwrite(text.data(), 1, text.size(), file) == text.size();
+    if ((file != nullptr && std::fclose(file) != 0) || !is_written) {
+        fail(std::generic_category().message(errno));
     }
     fs::rename(made, path, code);
     if (code) {

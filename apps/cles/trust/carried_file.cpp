@@ -2,12 +2,13 @@
 #include "trust/carried_file.hpp"
 
 #include "output/errors.hpp"
+#include "system/whole_file.hpp"
 
 #include <cerrno>
 #include <cstddef>
-#include <fstream>
+#include <ios>
 #include <iostream>
-#include <istream>
+#include <string>
 #include <system_error>
 
 namespace tool {
@@ -15,20 +16,13 @@ namespace {
 
 constexpr std::size_t max_line = 1'000'000;
 
-std::string line_of(std::istream& in, const std::string& origin) {
-    std::string out(max_line + 2, '\0'); // with its LF, and a byte more
-    in.read(out.data(), static_cast<std::streamsize>(out.size()));
-    if (in.bad()) {
-        throw usage_error("cannot read " + origin + ": " + std::generic_category().message(errno));
-    }
-    out.resize(static_cast<std::size_t>(in.gcount()));
-    if (out.ends_with('\n')) {
-        out.pop_back();
-    }
-    if (out.size() > max_line) {
-        throw usage_error(origin + " is longer than any file that is carried between nodes");
-    }
-    return out;
+constexpr std::size_t most_read = max_line + 2; // with its LF, and a byte more
+
+std::error_code read_stdin(std::string& to) {
+    to.resize(most_read);
+    std::cin.read(to.data(), static_cast<std::streamsize>(to.size()));
+    to.resize(static_cast<std::size_t>(std::cin.gcount()));
+    return {std::cin.bad() ? errno : 0, std::generic_category()};
 }
 
 } // namespace
@@ -36,16 +30,18 @@ std::string line_of(std::istream& in, const std::string& origin) {
 std::string carried_file_name(const std::string& name) { return name == "-" ? "stdin" : name; }
 
 std::string read_carried_file(const std::string& name) {
-    if (name == "-") {
-        return line_of(std::cin, carried_file_name(name));
+    std::string line;
+    const auto origin = carried_file_name(name);
+    if (const auto why = name == "-" ? read_stdin(line) : read_file(name, line, most_read)) {
+        throw usage_error("cannot read " + origin + ": " + why.message());
     }
-    std::ifstream file{name, std::ios::binary};
-    // A directory can be opened, but not read.
-    if (!file || (file.peek() == std::ifstream::traits_type::eof() && errno == EISDIR)) {
-        throw usage_error("cannot read " + name + ": " + std::generic_category().message(errno));
+    if (line.ends_with('\n')) {
+        line.pop_back();
     }
-    file.clear();
-    return line_of(file, name);
+    if (line.size() > max_line) {
+        throw usage_error(origin + " is longer than any file that is carried between nodes");
+    }
+    return line;
 }
 
 } // namespace tool

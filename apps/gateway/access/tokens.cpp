@@ -4,6 +4,7 @@
 #include <cles/security/checked_file.hpp>
 
 #include "gateway/http/message.hpp"
+#include "system/whole_file.hpp"
 
 #include <openssl/evp.h>
 #include <openssl/rand.h>
@@ -32,23 +33,6 @@ constexpr std::size_t hash_digits = 64;
 }
 
 std::string system_reason() { return std::generic_category().message(errno); }
-
-std::string content_of(int descriptor, const std::string& path) {
-    std::string text(longest_file, '\0');
-    std::size_t size = 0;
-    while (size < text.size()) {
-        const auto count = ::read(descriptor, text.data() + size, text.size() - size);
-        if (count < 0) {
-            fail_at(path, system_reason());
-        }
-        if (count == 0) {
-            text.resize(size);
-            return text;
-        }
-        size += static_cast<std::size_t>(count);
-    }
-    fail_at(path, "it is longer than 1 MiB");
-}
 
 std::string hex_of(std::span<const unsigned char> bytes) {
     constexpr std::string_view digits = "0123456789abcdef";
@@ -122,7 +106,13 @@ std::optional<token_table> token_file::read_if_changed() {
     if ((found.st_mode & 077U) != 0) {
         fail_at(path_, "others may read it: run chmod 600 " + path_);
     }
-    const auto text = content_of(file.descriptor(), path_);
+    std::string text;
+    if (const auto why = tool::read_open_file(file.descriptor(), text, longest_file)) {
+        fail_at(path_, why.message());
+    }
+    if (text.size() == longest_file) {
+        fail_at(path_, "it is longer than 1 MiB");
+    }
     try {
         return token_table::read(text);
     } catch (const std::runtime_error& e) {

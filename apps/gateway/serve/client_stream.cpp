@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "gateway/serve/client_stream.hpp"
 
+#include "system/whole_file.hpp"
+
 #include <boost/asio/post.hpp>
 #include <boost/asio/ssl/context.hpp>
 #include <boost/asio/ssl/stream.hpp>
@@ -80,16 +82,19 @@ std::shared_ptr<asio::ssl::context> tls_context(const std::string& certificate, 
     made->set_options(context::default_workarounds | context::no_sslv2 | context::no_sslv3 | context::no_tlsv1 |
                           context::no_tlsv1_1,
                       code);
-    const auto check = [&code](const std::string& path) {
-        if (code) {
-            throw std::runtime_error(path + ": " + code.message());
+    const auto check = [](const std::string& path, const auto& failed) {
+        if (failed) {
+            throw std::runtime_error(path + ": " + failed.message());
         }
     };
-    check("TLS");
-    made->use_certificate_chain_file(certificate, code);
-    check(certificate);
-    made->use_private_key_file(key, context::pem, code);
-    check(key);
+    std::string text;
+    check("TLS", code);
+    check(certificate, tool::read_file(certificate, text));
+    made->use_certificate_chain(asio::buffer(text), code);
+    check(certificate, code);
+    check(key, tool::read_file(key, text));
+    made->use_private_key(asio::buffer(text), context::pem, code);
+    check(key, code);
     return made;
 }
 

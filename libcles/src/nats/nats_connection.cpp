@@ -11,7 +11,8 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <fstream>
+#include <cstdio>
+#include <memory>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -96,11 +97,28 @@ std::string refusal(std::string said) {
     return said;
 }
 
+struct close_file {
+    void operator()(std::FILE* file) const noexcept { std::fclose(file); }
+};
+
+// Null if it cannot be read. Programs that other threads start meanwhile do not inherit it.
+std::unique_ptr<std::FILE, close_file> open_file(const std::string& file) {
+    return std::unique_ptr<std::FILE, close_file>{std::fopen(file.c_str(), "re")};
+}
+
 // Empty if it can be read.
 std::string why_unreadable(const std::string& file) {
-    errno = 0;
-    const std::ifstream opened{file};
-    return opened ? std::string{} : "cannot read " + file + ": " + std::generic_category().message(errno);
+    return open_file(file) ? std::string{} : "cannot read " + file + ": " + std::generic_category().message(errno);
+}
+
+std::string first_line_of(const std::string& file) {
+    std::string line;
+    if (const auto opened = open_file(file)) {
+        for (int c = std::fgetc(opened.get()); c != EOF && c != '\n'; c = std::fgetc(opened.get())) {
+            line.push_back(static_cast<char>(c));
+        }
+    }
+    return line;
 }
 
 std::string to_text(const char* text) { return text == nullptr ? std::string{} : std::string{text}; }
@@ -350,8 +368,8 @@ std::string nats_connection::configure(natsOptions* made) {
     }
     std::string token;
     if (!options_.token.empty()) {
-        std::ifstream file{options_.token};
-        if (!std::getline(file, token) || token.empty()) {
+        token = first_line_of(options_.token);
+        if (token.empty()) {
             return "cannot read a token from " + options_.token + ": its first line is empty";
         }
     }

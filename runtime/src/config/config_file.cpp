@@ -7,12 +7,11 @@
 #include "config/config.hpp"
 #include "config/config_values.hpp"
 #include "config/yaml_value.hpp"
+#include "system/whole_file.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cstddef>
-#include <fstream>
 #include <functional>
 #include <map>
 #include <optional>
@@ -455,14 +454,10 @@ void read_config(const std::string& text, const std::string& name, config& into)
 }
 
 void read_config_file(const std::string& path, config& into) {
-    errno = 0;
-    std::ifstream in{path, std::ios::binary};
-    std::string text(max_file_size + 1, '\0');
-    in.read(text.data(), static_cast<std::streamsize>(text.size()));
-    if (!in && !in.eof()) {
-        throw config_error(path, "cannot be read: " + std::generic_category().message(errno));
+    std::string text;
+    if (const auto why = tool::read_file(path, text, max_file_size + 1)) {
+        throw config_error(path, "cannot be read: " + why.message());
     }
-    text.resize(static_cast<std::size_t>(in.gcount()));
     if (text.size() > max_file_size) {
         throw config_error(path, "has more than " + std::to_string(max_file_size) + " bytes");
     }

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "daemon/idle_memory.hpp"
 
+#include "system/whole_file.hpp"
+
 #include <ctime>
-#include <fstream>
+#include <sstream>
+#include <string>
 #include <utility>
 
 #include <unistd.h>
@@ -22,7 +25,9 @@ bool has_grown(std::uint64_t now, std::uint64_t before) noexcept {
 
 process_usage usage_of_process() {
     process_usage found;
-    std::ifstream pages{"/proc/self/statm"};
+    std::string text;
+    static_cast<void>(tool::read_file("/proc/self/statm", text)); // empty if it cannot be read
+    std::istringstream pages{text};
     std::uint64_t all = 0;
     std::uint64_t resident = 0;
     if (pages >> all >> resident) {
