@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace plugin_jobs {
@@ -221,6 +222,46 @@ BOOST_AUTO_TEST_CASE(the_end_answers_all_hands_out_who_is_to_be_told_and_posts_n
     BOOST_TEST(!jobs.finish(job, done));
     BOOST_TEST(jobs.stopped(job));
     BOOST_TEST(io.poll() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_turn_ends_even_if_the_job_asks_again_and_again) {
+    using cles::runtime::plugin_turn;
+    std::vector<std::function<void()>> passed_on;
+    int calls = 0;
+    std::function<void()> again = [&] {
+        ++calls;
+        BOOST_TEST(plugin_turn::current_job() == 7U);
+        plugin_turn::call_at_end(again, [&](std::function<void()> rest) { passed_on.push_back(std::move(rest)); });
+    };
+    {
+        plugin_turn other{8};
+        {
+            plugin_turn turn{7};
+            again();
+        }
+        BOOST_TEST(plugin_turn::current_job() == 8U);
+    }
+    BOOST_TEST(calls == 1 + plugin_turn::most_rounds);
+    BOOST_REQUIRE(passed_on.size() == 1U);
+    const auto rest = passed_on.front();
+    rest(); // another turn
+    BOOST_TEST(calls == 1 + 2 * plugin_turn::most_rounds);
+    BOOST_TEST(passed_on.size() == 2U);
+    BOOST_TEST(plugin_turn::current_job() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(what_a_job_gets_after_its_turn_comes_at_the_end_of_it) {
+    using cles::runtime::plugin_turn;
+    const auto nowhere = [](const std::function<void()>&) { BOOST_ERROR("it stays here"); };
+    std::string order;
+    {
+        plugin_turn turn{7};
+        for (int i = 0; i < 2 * plugin_turn::most_rounds; ++i) { // at once, however many
+            plugin_turn::call_at_end([&] { order += "b"; }, nowhere);
+        }
+        order += "a";
+    }
+    BOOST_TEST(order == "a" + std::string(2 * plugin_turn::most_rounds, 'b'));
 }
 
 BOOST_AUTO_TEST_SUITE_END()

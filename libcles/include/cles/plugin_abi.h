@@ -21,9 +21,10 @@
  * - The handle of a job that has been answered, or that never existed, does no harm: the call does nothing and is
  *   counted. Nor does that of a feed that has ended.
  * - The code of a job runs in turns: first `start` of its task, then its callbacks of `cles_ask` and `cles_next`, each
- * after the one before has returned. Only its callback for `on_stop` may run beside them. This holds for an event of a
- * feed that has ended, too, and for a job that has been answered, with one exception: if a thread of the plugin itself
- * asks for something then, the callback comes as soon as the host has a thread for it.
+ *   after the one before has returned. Only its callback for `on_stop` may run beside them. This holds after the job's
+ *   answer and after a feed's end, too. Exceptions: for what a thread of the plugin or another job asks then, the
+ *   callback comes as soon as the host has a thread for it; and a job that asks from each callback for the next event
+ *   of a feed that has ended gets the later ones on another thread.
  * - No exception may leave a function of the plugin. (The host catches one if the compilers allow it.)
  * - A structure begins with its size as its writer knows it, so that later versions can append members: read none
  *   beyond that size. A change that is not possible in this way changes `abi_major` and the name of the entry point.

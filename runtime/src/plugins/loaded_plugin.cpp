@@ -419,10 +419,11 @@ void loaded_plugin::next(plugin_feeds::id feed, const cles_next& wanted) {
     waiting->sent();
 }
 
-// Not beside the job's other code.
+// Not beside the job's other code: on the I/O thread, too, if that runs there, as its other callbacks do.
 void loaded_plugin::call_after(plugin_jobs::id job, std::function<void()> callback) {
     if (job != 0 && job == plugin_turn::current_job()) {
-        plugin_turn::call_at_end(std::move(callback));
+        plugin_turn::call_at_end(std::move(callback),
+                                 [this](std::function<void()> rest) { call_on_other_thread(std::move(rest)); });
     } else {
         call_on_other_thread(std::move(callback));
     }

@@ -238,7 +238,8 @@ std::uint64_t plugin_jobs::unknown_answers() const {
 plugin_turn::plugin_turn(plugin_jobs::id job) noexcept : job_(job), outer_(std::exchange(current_turn, this)) {}
 
 plugin_turn::~plugin_turn() {
-    while (!waiting_.empty()) {
+    int round = 0;
+    while (!waiting_.empty() && (++round <= most_rounds || !pass_on())) {
         for (const auto& each : std::exchange(waiting_, {})) {
             each();
         }
@@ -246,9 +247,26 @@ plugin_turn::~plugin_turn() {
     current_turn = outer_;
 }
 
+// Returns false if that is not possible.
+bool plugin_turn::pass_on() noexcept {
+    try {
+        elsewhere_([job = job_, waiting = waiting_, elsewhere = elsewhere_] {
+            plugin_turn next{job};
+            next.waiting_ = waiting;
+            next.elsewhere_ = elsewhere;
+        });
+        return true;
+    } catch (...) { // no memory
+        return false;
+    }
+}
+
 plugin_jobs::id plugin_turn::current_job() noexcept { return current_turn == nullptr ? 0 : current_turn->job_; }
 
-void plugin_turn::call_at_end(std::function<void()> what) { current_turn->waiting_.push_back(std::move(what)); }
+void plugin_turn::call_at_end(std::function<void()> what, other_thread elsewhere) {
+    current_turn->elsewhere_ = std::move(elsewhere);
+    current_turn->waiting_.push_back(std::move(what));
+}
 
 // -- what jobs wait for --------------------------------------------------------------------------------------------
 

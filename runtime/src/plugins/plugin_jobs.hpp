@@ -95,6 +95,12 @@ class plugin_jobs {
 /// afterwards waits for the end of the turn.
 class plugin_turn {
   public:
+    /// Calls a function on another thread.
+    using other_thread = std::function<void(std::function<void()>)>;
+    /// A turn may prolong itself so often at its end; then a turn on another thread continues it, so that a job which
+    /// asks again and again for what has ended keeps no worker.
+    static constexpr int most_rounds = 64;
+
     explicit plugin_turn(plugin_jobs::id job) noexcept;
     plugin_turn(const plugin_turn&) = delete;
     plugin_turn& operator=(const plugin_turn&) = delete;
@@ -104,12 +110,15 @@ class plugin_turn {
     /// The job of this thread's turn; 0: none.
     [[nodiscard]] static plugin_jobs::id current_job() noexcept;
     /// Calls it at the end of this thread's turn. \pre it has one
-    static void call_at_end(std::function<void()> what);
+    static void call_at_end(std::function<void()> what, other_thread elsewhere);
 
   private:
+    bool pass_on() noexcept;
+
     plugin_jobs::id job_;
     plugin_turn* outer_;
     std::vector<std::function<void()>> waiting_;
+    other_thread elsewhere_;
 };
 
 /// Something that a plugin's job waits for. The plugin gets it exactly once, even if it never arrives, and never during
