@@ -177,11 +177,11 @@ class process_jobs::call final : public detail::call_control {
         current = this;
         sent_before_ = control_connection::lines_sent_by_this_thread();
     }
-    /// The handler has returned. Returns its reply, if it goes over the lane: not if what it has logged after that has
-    /// to be read before the job ends.
+    /// The handler has returned. Returns its reply, if it goes over the lane: not if it has said something after that,
+    /// which is to be read before the job ends, and to which an answer may come that the requester must not wait for.
     std::optional<std::string> end() {
         current = nullptr;
-        if (traced_ && direct_ && sent_before_ != control_connection::lines_sent_by_this_thread()) {
+        if (direct_ && sent_before_ != control_connection::lines_sent_by_this_thread()) {
             jobs_.daemon_.say(wire_line_writer{id_}.body(*std::exchange(direct_, std::nullopt)));
         }
         return std::move(direct_);
@@ -380,7 +380,7 @@ void process_jobs::progress_unwanted(std::uint64_t id) {
 }
 
 void process_jobs::resume_on_notifier(std::string_view line) {
-    // As above.
+    // What is read from a line are views of it.
     notifier_.notify({.callback = [this, kept = std::string{line}] { resume(read_wire_line(kept).value(), kept); }});
 }
 

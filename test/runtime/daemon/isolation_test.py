@@ -862,6 +862,11 @@ class Same(unittest.TestCase):
             wait_until(lambda d=d: json.loads(d.ask("PULL self:late_events"))[0] == 1, "the event has come")
             self.assertEqual(d.ask("PULL self:late_events"), "[1,0]")
 
+    def test_a_requester_does_not_wait_for_what_a_job_asks_after_its_answer(self):
+        for d in (self.here, self.there):
+            self.addCleanup(d.ask, "PUSH self:release")
+            self.assertEqual(d.ask("DELEGATE self:asks_after_its_answer"), '{"value":1}')
+
     def test_feeds_end_with_their_jobs(self):
         for d in (self.here, self.there):
             def waiting(d=d):

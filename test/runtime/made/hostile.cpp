@@ -433,6 +433,19 @@ void register_jobs(cles::registrar& to) {
         }
         late->in_handler = false;
     });
+    // Its callback comes while its handler runs, and does not return before it is released.
+    const auto released = std::make_shared<std::atomic<bool>>(false);
+    to.on_delegate("asks_after_its_answer", [released](const cles::request&, const cles::responder& answer) {
+        const auto from = answer.bind("self:silent");
+        answer.done(1);
+        from.next([released](boost::system::error_code, const cles::job_event&) {
+            while (!*released) {
+                std::this_thread::sleep_for(1ms);
+            }
+        });
+        std::this_thread::sleep_for(20ms);
+    });
+    to.on_push("release", [released] { *released = true; });
     to.on_pull("late_events", [late] { return std::vector{late->all.load(), late->early.load()}; });
     to.on_delegate("ages", [](const cles::request& asked) {
         std::this_thread::sleep_for(std::chrono::milliseconds{asked.parameter<int>(0)});
