@@ -86,6 +86,9 @@ bool feed_mailbox::put_in_batch(const detail::raw_event& event, hand_over when) 
         auto found = verdict::kept; // an exception comes from its conversion
         reading call;
         completions.now([&] { found = keep(event, call); });
+        if (!call.feed_is_gone && batch_ != nullptr && !queue_.empty()) {
+            announce(); // what the conversion has let in: a call of `pump` meanwhile could not deliver it
+        }
         if (call.feed_is_gone || found == verdict::kept) {
             if (!call.feed_is_gone && batch_ != nullptr && kept_ != 0) {
                 if (queue_.has_space(kept_, kept_bytes_)) {

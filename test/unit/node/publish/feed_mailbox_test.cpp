@@ -56,6 +56,9 @@ struct batch_wait final : cles::detail::pending_batch {
             }
         }
         convert(event.body);
+        if (std::exchange(malformed, false)) {
+            return verdict::malformed;
+        }
         kept.emplace_back(event.kind == cles::feed_event::gap ? "gap" : event.body);
         return verdict::kept;
     }
@@ -77,6 +80,7 @@ struct batch_wait final : cles::detail::pending_batch {
     int completed = 0;
     boost::system::error_code failed;
     bool unreadable = false;
+    bool malformed = false; // what it reads turns out to be no JSON
     bool discarded = false;
 };
 
@@ -318,6 +322,32 @@ BOOST_AUTO_TEST_CASE(a_conversion_of_batches_may_throw) {
     f.pump();
     f.pump();
     BOOST_TEST((f.w.got == batch_fixture::batches{{"[1]", "[3]"}, {"[1]", "[3]"}}));
+}
+
+BOOST_AUTO_TEST_CASE(what_a_conversion_lets_in_is_delivered_without_another_update) {
+    for (const bool is_malformed : {false, true}) {
+        batch_fixture f;
+        f.follow(f.w);
+        f.w.convert = [&](std::string_view body) { // it runs the executor, on which an update arrives, and `pump`
+            if (body == "[1]") {
+                f.w.convert = [](std::string_view) {};
+                f.put(2, 2);
+                f.pump();
+                f.w.malformed = is_malformed;
+                if (!is_malformed) {
+                    throw 1;
+                }
+            }
+        };
+        BOOST_TEST(f.mail->put({.body = "[1]"}) != is_malformed);
+        BOOST_TEST(f.completions.has_thrown() != is_malformed);
+        if (f.completions.has_thrown()) {
+            BOOST_CHECK_THROW(f.completions.rethrow(), int);
+        }
+        BOOST_TEST(f.pumps == 1);
+        f.pump();
+        BOOST_TEST((f.w.got == batch_fixture::batches{{"[2]"}}));
+    }
 }
 
 BOOST_AUTO_TEST_CASE(a_handler_of_batches_may_close_or_destroy_its_feed) {
