@@ -102,7 +102,7 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
     // remains: it may throw then, or run the executor until the next event comes.
     void pump(core::feed_mailbox& mail) {
         is_pump_posted_ = false;
-        for (auto left = mail.waiting() + 1; left != 0 && mail.pump(); --left) {
+        for (auto left = mail.unfetched() + 1; left != 0 && mail.pump(); --left) {
         }
     }
     void pump_soon(core::feed_mailbox& mail) {

@@ -107,7 +107,7 @@ class feed_mailbox {
     [[nodiscard, gnu::cold]] event_ptr close();
     [[nodiscard]] bool closed() const noexcept { return closed_; }
     /// How many events have not been fetched.
-    [[nodiscard]] std::size_t waiting() const noexcept { return queue_.size(); }
+    [[nodiscard]] std::size_t unfetched() const noexcept { return queue_.size(); }
     [[nodiscard]] bool has_waiter() const noexcept { return waiter_ != nullptr || reading_ != nullptr; }
 
   private:
