@@ -27,6 +27,19 @@ BOOST_AUTO_TEST_CASE(between_two_updates_it_knows_where_a_vehicle_was, *boost::u
     BOOST_TEST(!book.position("v2", 1));
 }
 
+BOOST_AUTO_TEST_CASE(it_has_the_last_minutes_of_a_vehicle) {
+    platoon::logbook book;
+    for (int i = 0; i <= 4'000; ++i) {
+        book.add("v1", told(i, 20.0 * i, 20));
+    }
+    BOOST_TEST(!book.position("v1", 2'000));
+    BOOST_TEST(book.position("v1", 4'000 - platoon::logbook::longest).has_value());
+    book.add("v1", told(4'000.001, 0, 20)); // no vehicle sends so fast
+    BOOST_TEST(book.last("v1")->t == 4'000);
+    book.forget("v1");
+    BOOST_TEST((book.last("v1") == nullptr));
+}
+
 BOOST_AUTO_TEST_CASE(one_that_was_killed_brakes_and_one_that_left_is_not_there) {
     platoon::logbook book;
     book.add("v1", told(1, 0, 20));

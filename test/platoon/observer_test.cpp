@@ -59,6 +59,29 @@ BOOST_AUTO_TEST_CASE(tells_changes_of_modes_once) {
     BOOST_TEST((who.book().mode("b", 0.25) == role::radar));
 }
 
+BOOST_AUTO_TEST_CASE(of_a_vehicle_that_changes_its_mode_all_the_time_some_changes_are_told) {
+    int told = 0;
+    for (int i = 1; i <= 900; ++i) { // 18 s
+        const double t = i * 0.02;
+        told += who.take("b", at(t, 25 * t, i % 2 == 0 ? role::follow : role::radar), t) ? 1 : 0;
+    }
+    BOOST_TEST(told == 20);
+    BOOST_TEST((who.book().mode("b", 18) == role::follow));
+}
+
+BOOST_AUTO_TEST_CASE(hears_so_many_vehicles_and_forgets_silent_ones_for_new_ones) {
+    for (int i = 0; i < 100; ++i) {
+        who.take("x" + std::to_string(i), at(1, 100 + 15 * i), 1);
+    }
+    BOOST_TEST(who.vehicles().size() == platoon::observer::most_vehicles);
+    BOOST_TEST(who.end_silent(2.5, 2).size() == 3U); // a, b and c
+    who.take("y", at(2.5, 0), 2.5);
+    BOOST_TEST(who.vehicles().size() == platoon::observer::most_vehicles);
+    BOOST_TEST((who.book().last("y") != nullptr));
+    BOOST_TEST((who.book().last("a") == nullptr));
+    BOOST_TEST((who.book().last("x0") != nullptr));
+}
+
 BOOST_AUTO_TEST_CASE(what_no_vehicle_can_send_does_not_count) {
     who.take("x", {.t = 0, .x = NAN}, 0);
     BOOST_TEST(who.vehicles().size() == 3U);

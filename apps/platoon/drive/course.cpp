@@ -43,7 +43,7 @@ recording course_of(const logbook& book, const course_setup& how) {
         lengths.push_back(last == nullptr ? how.length : last->length);
     }
     double least = NAN;
-    for (long step = 0; static_cast<double>(step) * sample_step < how.end; ++step) {
+    for (long step = std::lround(how.from / sample_step); static_cast<double>(step) * sample_step < how.end; ++step) {
         const double t = static_cast<double>(step) * sample_step;
         std::vector<motion> those_first;
         std::vector<placed> present;

@@ -14,7 +14,8 @@ struct course_setup {
     std::vector<std::string> first{}; ///< the vehicles at the start, in their order; at least one
     std::vector<double> desired{};    ///< the distance of each to the one ahead, m; that of the first does not count
     std::vector<std::string> all{};   ///< that took part
-    double begin = 0, end = 0;        ///< the verdict is on the time between
+    double from = 0, end = 0;         ///< the courses, gaps and collisions are of the time between
+    double begin = 0;                 ///< when errors of spacing begin to count
     double spacing = 0, length = 0;
     double recovery = 0; ///< when the second half of the manoeuvre begins
 };

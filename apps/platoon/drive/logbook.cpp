@@ -2,6 +2,7 @@
 #include "platoon/drive/logbook.hpp"
 
 #include <algorithm>
+#include <cstddef>
 
 namespace platoon {
 namespace {
@@ -22,9 +23,19 @@ motion between(const state& a, const state& b, double t) {
 
 void logbook::add(const std::string& vehicle, const state& told) {
     auto& all = states_[vehicle];
-    if (all.empty() || told.t > all.back().t) {
-        all.push_back(told);
+    if (!all.empty() && told.t < all.back().t + closest) {
+        return;
     }
+    const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
+    if (!all.empty() && middle->t < told.t - longest) {
+        all.erase(all.begin(), middle);
+    }
+    all.push_back(told);
+}
+
+void logbook::forget(const std::string& vehicle) {
+    states_.erase(vehicle);
+    ended_.erase(vehicle);
 }
 
 void logbook::record_end(const std::string& vehicle, bool left) { ended_.try_emplace(vehicle, left); }

@@ -14,7 +14,12 @@ namespace platoon {
 /// The updates of each vehicle during a drive, and therefore its position at any time.
 class logbook {
   public:
+    static constexpr double longest = 600;   ///< s, which it has of each vehicle; older updates are forgotten
+    static constexpr double closest = 0.005; ///< s; what follows an update sooner does not count
+
     void add(const std::string& vehicle, const state& told);
+    /// Nothing is known of it any more.
+    void forget(const std::string& vehicle);
     /// Its process has ended. \param left as planned: it is no longer on the lane; otherwise it stays there, and brakes
     void record_end(const std::string& vehicle, bool left);
     /// It had not.

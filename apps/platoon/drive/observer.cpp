@@ -9,7 +9,7 @@
 namespace platoon {
 
 std::optional<event> observer::take(const std::string& from, const state& told, double now) {
-    if (!implausible(told, law_).empty()) {
+    if (!implausible(told, law_).empty() || !has_room_for(from)) {
         return std::nullopt;
     }
     const auto* const last = book_.last(from);
@@ -18,18 +18,41 @@ std::optional<event> observer::take(const std::string& from, const state& told, 
     if (returns) {
         book_.record_return(from);
     }
-    heard_[from] = now;
+    auto& known = vehicles_[from];
+    known.heard = now;
     book_.add(from, told);
-    if (!changed) {
+    if (changed && now - known.since >= change_period) {
+        known.since = now;
+        known.changes = 0;
+    }
+    if (!changed || ++known.changes > most_changes) {
         return std::nullopt;
     }
     return event{.t = now, .vehicle = from, .mode = boost::describe::enum_to_string(told.mode, "")};
 }
 
+// Anybody may publish in the group, under any number of names.
+bool observer::has_room_for(const std::string& name) {
+    if (vehicles_.size() < most_vehicles || vehicles_.contains(name)) {
+        return true;
+    }
+    const auto heard_before = [this](const std::string& a, const std::string& b) {
+        return vehicles_.at(a).heard < vehicles_.at(b).heard;
+    };
+    const auto found = std::min_element(silent_.begin(), silent_.end(), heard_before);
+    if (found == silent_.end()) {
+        return false;
+    }
+    book_.forget(*found);
+    vehicles_.erase(*found);
+    silent_.erase(found);
+    return true;
+}
+
 std::vector<event> observer::end_silent(double now, double longest, const std::set<std::string>& except) {
     std::vector<event> events;
-    for (const auto& [name, at] : heard_) {
-        if (now - at > longest && !book_.has_ended(name) && !except.contains(name)) {
+    for (const auto& [name, known] : vehicles_) {
+        if (now - known.heard > longest && !book_.has_ended(name) && !except.contains(name)) {
             const bool left = book_.last(name)->mode == role::leave;
             book_.record_end(name, left);
             silent_.insert(name);
@@ -41,8 +64,8 @@ std::vector<event> observer::end_silent(double now, double longest, const std::s
 
 std::vector<std::string> observer::vehicles() const {
     std::vector<std::string> names;
-    names.reserve(heard_.size());
-    for (const auto& [name, at] : heard_) {
+    names.reserve(vehicles_.size());
+    for (const auto& [name, known] : vehicles_) {
         names.push_back(name);
     }
     return names;
@@ -50,7 +73,7 @@ std::vector<std::string> observer::vehicles() const {
 
 std::vector<std::string> observer::lane(double t) const {
     std::vector<std::pair<double, std::string>> there;
-    for (const auto& [name, at] : heard_) {
+    for (const auto& [name, known] : vehicles_) {
         if (const auto where = book_.position(name, t)) {
             there.emplace_back(-where->x, name);
         }

@@ -6,6 +6,8 @@
 #include "platoon/driver/state.hpp"
 #include "platoon/driver/vehicle_report.hpp"
 
+#include <cmath>
+#include <cstddef>
 #include <map>
 #include <optional>
 #include <set>
@@ -18,6 +20,12 @@ namespace platoon {
 /// and no network.
 class observer {
   public:
+    /// Of more, those are forgotten that are silent, or the new ones are not heard.
+    static constexpr std::size_t most_vehicles = 64;
+    /// Of one vehicle's changes in so many seconds, only so many are told.
+    static constexpr int most_changes = 10;
+    static constexpr double change_period = 10;
+
     explicit observer(const gains& law) : law_(law) {}
 
     /// A state has arrived. \return what has changed: a vehicle has another mode, or is there again
@@ -37,9 +45,16 @@ class observer {
     [[nodiscard]] std::vector<double> desired(const std::vector<std::string>& lane, double spacing, double speed) const;
 
   private:
+    struct one_heard {
+        double heard = 0;         ///< when it was received last
+        double since = -INFINITY; ///< when the period began in which these have changed
+        int changes = 0;
+    };
+    [[nodiscard]] bool has_room_for(const std::string& name);
+
     gains law_;
     logbook book_;
-    std::map<std::string, double> heard_; ///< when each was received last
+    std::map<std::string, one_heard> vehicles_;
     std::set<std::string> silent_;
 };
 

@@ -22,8 +22,10 @@
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <cstddef>
 #include <cstdio>
 #include <exception>
+#include <iterator>
 #include <vector>
 
 #include <unistd.h>
@@ -41,6 +43,8 @@ constexpr double silent_time = 0.5;  // s; five updates at 10 Hz
 constexpr double over_after = 2;     // s without an update
 constexpr double braked_by = 1;      // m/s, of the leader: a manoeuvre has begun
 constexpr double recovered_to = 0.5; // m/s, of its first speed
+constexpr double longest_course = logbook::longest;
+constexpr std::ptrdiff_t most_events = 10'000; // then the older half is forgotten
 
 cles::service_options watcher_options(const watch_options& options) {
     auto out = tool::options_of_member("watch-" + std::to_string(::getpid()), options.keys);
@@ -120,6 +124,9 @@ class platoon_watch {
     }
 
     void tell(const event& what) {
+        if (std::ssize(events_) == most_events) {
+            events_.erase(events_.begin(), events_.begin() + most_events / 2);
+        }
         events_.push_back(what);
         if (!options_.quiet && !options_.in_place) {
             std::fputs(line_of(what).c_str(), stdout);
@@ -146,11 +153,13 @@ class platoon_watch {
         if (first_.empty()) {
             begin();
         }
+        const double from = std::max(begun_, end_ - longest_course);
         auto out = course_of(observer_.book(), {.first = first_,
                                                 .desired = desired_,
                                                 .all = observer_.vehicles(),
-                                                .begin = begun_,
+                                                .from = from,
                                                 .end = end_,
+                                                .begin = from,
                                                 .spacing = options_.setup.spacing,
                                                 .length = options_.setup.limits.length,
                                                 .recovery = INFINITY});
