@@ -512,6 +512,7 @@ class drive_supervisor {
         };
         out.relayed = relayed_.delivered;
         out.lost = relayed_.lost;
+        out.overflown = relayed_.overflown;
         out.fallbacks = count("fallback");
         out.radar_spells = count("radar");
         out.latency = summarise(std::move(latencies));

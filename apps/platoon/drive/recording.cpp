@@ -133,6 +133,11 @@ std::string summary_of(const recording& drive) {
     if (drive.relayed + drive.lost != 0) {
         add(std::snprintf(line.data(), line.size(), "relay     %ju of %ju packets lost\n", std::uintmax_t{drive.lost},
                           std::uintmax_t{drive.relayed + drive.lost}));
+        if (drive.overflown != 0) {
+            add(std::snprintf(line.data(), line.size(),
+                              "          %ju more could not be delivered: the losses differ\n",
+                              std::uintmax_t{drive.overflown}));
+        }
         add(std::snprintf(line.data(), line.size(),
                           "gaps      %ju updates missing of %ju, as the nodes of the vehicles reported\n",
                           std::uintmax_t{drive.missed}, std::uintmax_t{drive.received + drive.missed}));

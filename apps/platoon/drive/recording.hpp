@@ -53,6 +53,7 @@ struct recording {
     std::uint64_t sent = 0, received = 0; ///< updates, by vehicles that were bound
     std::uint64_t missed = 0;             ///< updates that nodes reported as gaps
     std::uint64_t relayed = 0, lost = 0;  ///< packets that the relay delivered, and that it lost
+    std::uint64_t overflown = 0;          ///< and those that the device of their vehicle did not take
     latency_summary latency{};
     std::vector<event> events{};
     std::vector<double> t{};
@@ -60,7 +61,7 @@ struct recording {
 };
 BOOST_DESCRIBE_STRUCT(recording, (),
                       (source, vehicles, hz, loss, burst, delay_ms, spacing, seed, steady, verdict, fallbacks,
-                       radar_spells, sent, received, missed, relayed, lost, latency, events, t, courses))
+                       radar_spells, sent, received, missed, relayed, lost, overflown, latency, events, t, courses))
 
 /// A few lines of text.
 std::string summary_of(const recording& drive);

@@ -14,11 +14,14 @@
 #include <boost/asio/signal_set.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
+#include <span>
 
 namespace platoon {
 
@@ -87,6 +90,8 @@ class packet_relay {
                 }
             }
         }
+        all.delivered -= std::min(overflown_, all.delivered);
+        all.overflown = overflown_;
         return all;
     }
 
@@ -97,13 +102,12 @@ class packet_relay {
                                         if (failed) {
                                             return; // the drive has ended
                                         }
-                                        const auto begin = devices_[from].buffer.begin();
-                                        carry(from, {begin, begin + static_cast<std::ptrdiff_t>(size)});
+                                        carry(from, std::span{devices_[from].buffer}.first(size));
                                         read(from);
                                     });
     }
 
-    void carry(std::size_t from, const packet& what) {
+    void carry(std::size_t from, std::span<const unsigned char> what) {
         constexpr unsigned char first_of_group = 224;
         constexpr unsigned char last_of_group = 239;
         constexpr unsigned char version_4 = 4;
@@ -112,7 +116,7 @@ class packet_relay {
         if (!carried) { // what the system sends by itself, such as IGMP
             return;
         }
-        const auto shared = std::make_shared<const packet>(what);
+        const auto shared = std::make_shared<const packet>(what.begin(), what.end());
         const bool to_all = what[at_destination] >= first_of_group && what[at_destination] <= last_of_group;
         for (std::size_t to = 0; to < devices_.size(); ++to) {
             if (to != from && (to_all || what[at_destination + 3] == host_number(to))) {
@@ -156,8 +160,9 @@ class packet_relay {
     }
 
     void deliver(const delayed& one) {
-        boost::system::error_code ignored; // its queue is full: lost, as on any link
-        devices_[one.to].stream.write_some(asio::buffer(*one.what), ignored);
+        boost::system::error_code failed;
+        devices_[one.to].stream.write_some(asio::buffer(*one.what), failed);
+        overflown_ += failed ? 1U : 0U;
     }
 
     asio::io_context io_{1};
@@ -167,6 +172,7 @@ class packet_relay {
     cles::service service_;
     std::vector<device> devices_;
     std::multimap<steady::time_point, delayed> waiting_;
+    std::uint64_t overflown_ = 0;
 };
 
 } // namespace

@@ -18,12 +18,12 @@ struct relayed_link {
 };
 BOOST_DESCRIBE_STRUCT(relayed_link, (), (from, to, delivered, lost))
 
-/// The same of all of them.
+/// The same of all of them. What a vehicle's device did not take is not delivered, though its link counts it.
 struct relay_count {
-    std::uint64_t delivered = 0, lost = 0;
+    std::uint64_t delivered = 0, lost = 0, overflown = 0;
     std::vector<relayed_link> links{};
 };
-BOOST_DESCRIBE_STRUCT(relay_count, (), (delivered, lost, links))
+BOOST_DESCRIBE_STRUCT(relay_count, (), (delivered, lost, overflown, links))
 
 struct relay_options {
     std::vector<int> devices{}; ///< of each vehicle, in their order
