@@ -4,6 +4,8 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
+#include <cstring>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
@@ -37,6 +39,10 @@ struct surroundings {
         ::_exit(127); // the parent has ended meanwhile
     }
     if (in.network >= 0 && ::setns(in.network, CLONE_NEWNET) != 0) {
+        const char* const why = ::strerrordesc_np(errno);
+        for (const std::string_view part : {"its network cannot be entered: ", why != nullptr ? why : "?", "\n"}) {
+            [[maybe_unused]] const auto written = ::write(in.err, part.data(), part.size());
+        }
         ::_exit(127);
     }
     for (const int each : in.inherited) {

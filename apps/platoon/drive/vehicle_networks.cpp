@@ -120,12 +120,21 @@ bool receive(int from, failure& what, std::array<int, 2>& descriptors) {
     message.msg_iovlen = 1;
     message.msg_control = space.data();
     message.msg_controllen = space.size();
-    if (::recvmsg(from, &message, MSG_CMSG_CLOEXEC) != static_cast<ssize_t>(sizeof what)) {
+    ssize_t size = 0;
+    do {
+        size = ::recvmsg(from, &message, MSG_CMSG_CLOEXEC);
+    } while (size < 0 && errno == EINTR);
+    if (size != static_cast<ssize_t>(sizeof what)) {
+        errno = size < 0 ? errno : ECONNRESET;
         what = failed("the process that creates it has ended");
         return false;
     }
     const auto* const head = CMSG_FIRSTHDR(&message);
     if (head == nullptr || head->cmsg_len != CMSG_LEN(sizeof descriptors)) {
+        if (what.why == 0) { // they were sent
+            errno = EMFILE;
+            what = failed("it cannot be received");
+        }
         return false;
     }
     std::memcpy(descriptors.data(), CMSG_DATA(head), sizeof descriptors);
@@ -156,8 +165,7 @@ bool create_network(unsigned number, failure& why, std::array<int, 2>& descripto
     }
     const bool received = creator > 0 && receive(pair[0], why, descriptors);
     ::close(pair[0]);
-    if (creator > 0) {
-        ::waitpid(creator, nullptr, 0);
+    while (creator > 0 && ::waitpid(creator, nullptr, 0) < 0 && errno == EINTR) {
     }
     return received;
 }
