@@ -58,8 +58,10 @@ void bridge_connection::send_cancel(const bridge_id& to, std::uint64_t number) {
 void bridge_connection::drop(const received_message& m, std::string_view why) {
     ++counts_.messages_refused;
     if (const auto left_out = dropped_.take({.kind = "dropped", .source = m.by.member}, m.at)) {
-        out_.log(log_level::warning, "dropped a message of NATS on " + std::string{m.where.substr(0, 256)} + ": " +
-                                         std::string{why} + core::left_out_text(*left_out));
+        const auto sender = m.by.member.empty() ? std::string{} : " from " + std::string{m.by.member};
+        out_.log(log_level::warning, "dropped a message of NATS" + sender + " on " +
+                                         std::string{m.where.substr(0, 256)} + ": " + std::string{why} +
+                                         core::left_out_text(*left_out));
     }
 }
 

@@ -373,6 +373,7 @@ BOOST_FIXTURE_TEST_CASE(a_bridge_acknowledges_for_itself_only, three_pools) {
     BOOST_TEST(hub->answer(id).empty());
     BOOST_TEST(hub->core().counted().messages_refused == before + 2);
     BOOST_TEST(has_words(hub->logged, "it acknowledges a request for another bridge"));
+    BOOST_TEST(has_words(hub->logged, "dropped a message of NATS from west on "));
     pass(hub, reply_subject(hub.id(), 1), "", "taken=" + gate.id().instance + " {\"n\":2}", gate.sender());
     BOOST_TEST(hub->answer(id) == "{\"n\":2}");
 }
