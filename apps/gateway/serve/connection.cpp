@@ -181,8 +181,10 @@ void connection::respond(const http_response& response) {
     if (phase_ != phase::serving) {
         return;
     }
-    if (!has_room(response.body.size())) {
-        respond(response_to_failure(cles::errc::busy, {}, no_room(), response.fields));
+    if (const auto size = response.body.size(); !has_room(size)) {
+        const bool never = size > (token_.empty() ? most_unwritten : most_of_token);
+        respond(never ? response_of({413, "the response is larger than what may wait for a client", response.fields})
+                      : response_to_failure(cles::errc::busy, {}, no_room(), response.fields));
         return;
     }
     count(response.status);
