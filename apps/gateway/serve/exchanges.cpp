@@ -428,7 +428,7 @@ class openapi_exchange final : public fleet_exchange {
         }
         for (const auto& task : tasks) {
             const bool is_late = std::chrono::steady_clock::now() > until_;
-            if (of.types.empty() || !is_wanted() || is_late || told_ > most_types_at_once) {
+            if (of.types.empty() || !is_wanted() || is_late || types_told_ > most_types_at_once) {
                 co_return;
             }
             const auto key = what().who.name + " " + of.name + " " + of.types + " " + task;
@@ -450,14 +450,14 @@ class openapi_exchange final : public fleet_exchange {
                 known_.keep(key, told);
             }
             if (told.size() <= most_types_of_task) {
-                told_ += told.size();
+                types_told_ += told.size();
                 add_schemas(of, task, told);
             }
         }
     }
 
     type_cache& known_;
-    std::size_t told_ = 0; // bytes
+    std::size_t types_told_ = 0; // bytes
     std::chrono::steady_clock::time_point until_{};
 };
 
