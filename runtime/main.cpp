@@ -9,6 +9,7 @@
 #include "daemon/command_line.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/daemon_log.hpp"
+#include "daemon/idle_memory.hpp"
 #include "daemon/service_manager.hpp"
 #include "daemon/service_parts.hpp"
 #include "daemon/start_trial.hpp"
@@ -210,6 +211,7 @@ int main(int argc, char** argv) {
         return run_plugin_process(argc, argv);
     }
     set_up_signals();
+    keep_little_memory();
     try {
         return start(argc, argv);
     } catch (const tool::output_closed&) {

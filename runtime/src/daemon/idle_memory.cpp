@@ -43,6 +43,16 @@ process_usage usage_of_process() {
     return found;
 }
 
+void keep_little_memory() noexcept {
+#ifdef __GLIBC__
+    // Stating either of them, nothing that is freed changes them.
+    constexpr int from_the_system = 256 * 1024; // bytes; larger blocks
+    constexpr int end_of_heap = 512 * 1024;
+    ::mallopt(M_MMAP_THRESHOLD, from_the_system);
+    ::mallopt(M_TRIM_THRESHOLD, end_of_heap);
+#endif
+}
+
 void return_unused_memory() noexcept {
 #ifdef __GLIBC__
     ::malloc_trim(0);

@@ -16,6 +16,11 @@ struct process_usage {
 /// Of this process. What the system or the C library does not tell is 0.
 process_usage usage_of_process();
 
+/// From now on, what a thread has used and freed of large messages returns to the system, but for half a megabyte. By
+/// default, the C library takes blocks of a size that was freed once from a thread's heap, and keeps up to twice that
+/// size at the end of each heap, where nothing returns it.
+void keep_little_memory() noexcept;
+
 /// Returns to the system what the C library keeps, except for the end of the heaps of other threads.
 void return_unused_memory() noexcept;
 
