@@ -10,6 +10,7 @@ The tables below list the layers and what each may include: a new folder under l
 
 from __future__ import annotations
 
+import posixpath
 import re
 import statistics
 import sys
@@ -203,10 +204,13 @@ def includes_of(text: str) -> list[tuple[int, str, str]]:
 
 def statements_of(clean: str):
     """(line, text) of each stretch between ';', '{' and '}'."""
-    start = 0
+    start, line, counted = 0, 1, 0
     for match in re.finditer(r"[;{}]|\Z", clean):
         text = clean[start : match.start()].strip()
-        yield clean.count("\n", 0, clean.find(text, start)) + 1, text
+        begins = clean.find(text, start)
+        line += clean.count("\n", counted, begins)
+        counted = begins
+        yield line, text
         start = match.end()
 
 
@@ -272,16 +276,9 @@ class Tree:
         """The file of this tree that an include means, or nothing where it is another project's."""
         bases = ["libcles/include", "libcles/src", "apps/shared", "runtime/include", "runtime/src", "runtime", "test"]
         if quote == '"':
-            bases.insert(0, str(Path(name).parent))
+            bases.insert(0, posixpath.dirname(name))
         for base in bases:
-            parts: list[str] = []
-            for part in (Path(base) / header).as_posix().split("/"):
-                if part == "..":
-                    if parts:
-                        parts.pop()
-                elif part != ".":
-                    parts.append(part)
-            candidate = "/".join(parts)
+            candidate = posixpath.normpath(f"{base}/{header}")
             if candidate in self.texts:
                 return candidate
         return None
