@@ -94,12 +94,24 @@ outcomes run(const std::string& fleet, std::size_t count, const std::string& nod
     for (std::size_t i = 0; i < count; ++i) {
         members.push_back(std::make_unique<member>(fleet, "m" + std::to_string(i), node));
     }
+    std::vector<std::exception_ptr> failures(count);
     {
         std::vector<std::jthread> threads;
         const auto begin = steady::now();
         for (std::size_t i = 0; i < count; ++i) {
             const auto first = begin + between * static_cast<int>(i) / static_cast<int>(count);
-            threads.emplace_back([&each = *members[i], first, end = begin + span] { each.run(first, end); });
+            threads.emplace_back([&each = *members[i], &failure = failures[i], first, end = begin + span] {
+                try {
+                    each.run(first, end);
+                } catch (...) {
+                    failure = std::current_exception();
+                }
+            });
+        }
+    }
+    for (const auto& failure : failures) {
+        if (failure) {
+            std::rethrow_exception(failure);
         }
     }
     outcomes all;

@@ -203,7 +203,7 @@ class Collectors(unittest.TestCase):
         gateway = self.gateway_with_slow_name()
         begun = time.monotonic()
         self.assertEqual(gateway.stop(), 0)
-        self.assertLess(time.monotonic() - begun, 3)
+        self.assertLess(time.monotonic() - begun, PATIENCE / 2)
 
     @unittest.skipUnless(SLOW_NAMES, "a sanitizer has to be the first library of a process")
     def test_a_lookup_that_never_ends_is_given_up_and_not_begun_again(self):
@@ -216,7 +216,7 @@ class Collectors(unittest.TestCase):
         dropped = gateway.counted("spans_dropped")
         wait_until(lambda: gateway.counted("spans_dropped") > dropped, "the next ones, too")
         self.assertEqual(gateway.errors().count("is being looked up"), 1)
-        self.assertEqual(len(os.listdir(f"/proc/{gateway.process.pid}/task")), threads)
+        self.assertLessEqual(len(os.listdir(f"/proc/{gateway.process.pid}/task")), threads)
 
     def gateway_with_slow_name(self):
         gateway = Gateway("--otlp", "http://collector.slow.test", env=environment(LD_PRELOAD=SLOW_NAMES))

@@ -52,7 +52,7 @@ saved_contexts read_contexts() {
         return {};
     }
     if (failed) { // otherwise those in it would be lost when it is replaced
-        throw usage_error("the contexts in " + path.string() + " cannot be read");
+        throw usage_error("the contexts in " + path.string() + " cannot be read: " + failed.message());
     }
     saved_contexts out;
     std::string why;

@@ -239,7 +239,7 @@ void span_exporter::on_sent(std::size_t count, const std::string& why) {
         log_("the collector at " + cles::to_string(where_.at) + " does not take spans: " + why);
     }
     sending_ = nullptr;
-    send();
+    why.empty() ? send() : send_later();
 }
 
 } // namespace gateway

@@ -35,8 +35,8 @@ class tls_engine {
     /// Space for bytes from the peer; not empty if the last status was `need_input`.
     std::span<char> prepare();
     void commit(std::size_t count) noexcept { end_ += count; }
-    /// The peer is admitted: `prepare` may return more than the space for one record. Strangers get no longer turns
-    /// than that, so that those who send much do not delay others.
+    /// The peer is admitted: from now on, `prepare` may return more than 16 KiB. Strangers get no longer turns than
+    /// these, so that those who send much do not delay others.
     void admit() noexcept { max_input_ = 65536; }
     /// To be sent; the owner removes what it has sent.
     [[nodiscard]] std::string& encrypted() noexcept { return encrypted_; }

@@ -3,6 +3,7 @@
 
 #include "system/whole_file.hpp"
 
+#include <cstdlib>
 #include <ctime>
 #include <sstream>
 #include <string>
@@ -46,10 +47,15 @@ process_usage usage_of_process() {
 void keep_little_memory() noexcept {
 #ifdef __GLIBC__
     // Stating either of them, nothing that is freed changes them.
-    constexpr int from_the_system = 256 * 1024; // bytes; larger blocks
-    constexpr int end_of_heap = 512 * 1024;
-    ::mallopt(M_MMAP_THRESHOLD, from_the_system);
-    ::mallopt(M_TRIM_THRESHOLD, end_of_heap);
+    constexpr int largest_kept = 256 * 1024; // bytes
+    constexpr int most_at_end = 512 * 1024;
+    for (const char* stated : {"GLIBC_TUNABLES", "MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"}) {
+        if (std::getenv(stated) != nullptr) {
+            return;
+        }
+    }
+    ::mallopt(M_MMAP_THRESHOLD, largest_kept);
+    ::mallopt(M_TRIM_THRESHOLD, most_at_end);
 #endif
 }
 

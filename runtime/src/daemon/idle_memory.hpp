@@ -16,9 +16,10 @@ struct process_usage {
 /// Of this process. What the system or the C library does not tell is 0.
 process_usage usage_of_process();
 
-/// From now on, what a thread has used and freed of large messages returns to the system, but for half a megabyte. By
-/// default, the C library takes blocks of a size that was freed once from a thread's heap, and keeps up to twice that
-/// size at the end of each heap, where nothing returns it.
+/// From now on, the C library returns blocks of more than 256 KiB to the system when they are freed, and keeps at most
+/// half a megabyte at the end of a thread's heap. By default, it raises both to what was freed once, and nothing
+/// returns what it keeps there after a large message. What the environment states (GLIBC_TUNABLES, MALLOC_...) counts
+/// instead.
 void keep_little_memory() noexcept;
 
 /// Returns to the system what the C library keeps, except for the end of the heaps of other threads.
