@@ -70,7 +70,7 @@ class member {
         options.peers.emplace("node", node_);
         options.security = cles::secured(fleet_ + "/" + name_);
         boost::asio::io_context io{1};
-        cles::service started{io, std::move(options)};
+        cles::service started{io, options};
         ++found_.begun;
         const auto begun = steady::now();
         started.async_pull("node:cles", cles::call_options{}.deadline(longest),
