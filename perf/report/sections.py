@@ -1,5 +1,18 @@
 # SPDX-License-Identifier: BSL-1.0
-"""The sections of the report, in order. Each is measured by a script in perf/evaluation."""
+"""The sections of the report, in order. Each is measured by an executable script in perf/evaluation.
+
+A script takes [--quick] [-o FILE], and with the option --programs the folder of the programs. It reports progress on stderr, and
+writes one JSON object:
+
+    title, command, date, quick
+    machine     an object with processor and cores
+    figures     each with name, what (a description), value (a median), low and high (its 95 % interval), runs, unit, paper,
+                target (a description), reached, and, for a ratio (the unit "times"), ran: what each side ran, in one line
+    skipped     each with what and reason
+    series, pictures    see series_pictures.py
+
+With nothing to measure, it reports that and exits with 77.
+"""
 
 import os
 from dataclasses import dataclass
