@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Conversion between JSON and Python types, as the C++ library converts (docs/library.md, "Types")."""
+"""Conversion between JSON and Python types, as the C++ library converts (docs/library_reference.md, "Types")."""
 
 from __future__ import annotations
 

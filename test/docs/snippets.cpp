@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 // The code blocks of the pages, in one file that is compiled. test/docs/code_in_docs.py looks for each of them here and
 // in the examples.
-#include <cles/feed_batch.hpp>
 #include <cles/job_feed.hpp>
 #include <cles/security.hpp>
 #include <cles/service.hpp>
@@ -11,7 +10,6 @@
 #include <boost/asio/io_context.hpp>
 
 #include <iostream>
-#include <span>
 
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
@@ -20,24 +18,6 @@ struct position {
     double lat = 0, lon = 0;
 };
 BOOST_DESCRIBE_STRUCT(position, (), (lat, lon))
-
-enum class gear { park, reverse, drive };
-BOOST_DESCRIBE_ENUM(gear, park, reverse, drive)
-
-struct state {
-    gear selected = gear::park;
-    std::vector<double> pressures{};
-    std::optional<std::string> driver{}; // may be absent
-};
-BOOST_DESCRIBE_STRUCT(state, (), (selected, pressures, driver))
-
-struct pose {
-    double x = 0;
-    double y = 0;
-    double heading = 90; // new in the second release
-};
-BOOST_DESCRIBE_STRUCT(pose, (), (x, y, heading))
-CLES_DEFAULTS(pose, (heading))
 
 struct label {
     std::string klass;
@@ -57,9 +37,6 @@ CLES_FIELD(fix, lat, "deg", "latitude, WGS 84", -90, 90)
 CLES_FIELD(fix, lon, "deg", "longitude, WGS 84", -180, 180)
 CLES_FIELD(fix, speed, "m/s")
 
-bool only_look(const cles::access& asked) { return asked.verb == cles::verb::pull || asked.verb == cles::verb::bind; }
-
-void a_service();
 void an_open_service();
 void a_service_in_a_group();
 void a_hub(asio::io_context& io);
@@ -77,36 +54,19 @@ void record_camera(const cles::request& asked);
 void a_task_to_repeat(cles::registrar& tasks);
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres);
 asio::awaitable<void> asking(cles::service& car);
-asio::awaitable<void> asking_for_a_member(cles::service& car);
 asio::awaitable<void> finding(asio::io_context& io);
 asio::awaitable<void> errors(cles::service& car);
-asio::awaitable<void> feeds(cles::service& car, position here);
-asio::awaitable<void> feeds_of_all(cles::service& car);
-asio::awaitable<void> batches(cles::service& car);
-void follow_all(cles::feed<position>& positions);
+asio::awaitable<void> feeds(cles::service& car);
 void blocking(cles::service& me);
 asio::awaitable<double> drive_to(position where);
 double pressure_of(const cles::request& asked);
 void follow(const position& where);
-void record(const position& where);
 void slow_down(const std::string& why);
-
-void a_service() {
-    asio::io_context io;
-    cles::service car{io, {.name = "car1", .listen = {"tcp://127.0.0.1:0"}, .peers = {{"car0", "tcp://10.0.0.7"}}}};
-    car.on_pull("speed", [] { return 27.5; });
-    io.run();
-}
 
 void a_secured_service() {
     asio::io_context io;
     cles::service secured{
         io, {.name = "car1", .listen = {"tls://0.0.0.0:0"}, .security = cles::secured("/var/lib/cles/keys")}};
-}
-
-asio::awaitable<void> asking_for_a_member(cles::service& car) {
-    const auto fix = co_await car.async_pull("car0:position", cles::call_options{}.on_behalf_of("operator"));
-    std::cout << fix.text;
 }
 
 void an_open_service() {
@@ -137,9 +97,7 @@ asio::awaitable<void> asking(cles::service& car) {
     co_await car.async_push("car0:target", where);
     const auto metres = co_await car.async_delegate<double>("car0:park", where, cles::call_options{}.deadline(20s));
     const auto answer = co_await car.async_request("PULL car0:tyre/2"); // JSON, as text
-    const auto inside = co_await car.async_pull<double>("car0:tyre/" + cles::encode_parameter("front left"));
-    co_await car.async_push("car0:brake", 0.8, cles::call_options{}.urgent());
-    std::cout << metres << answer.text << inside;
+    std::cout << metres << answer.text;
 }
 
 asio::awaitable<void> finding(asio::io_context& io) {
@@ -149,14 +107,6 @@ asio::awaitable<void> finding(asio::io_context& io) {
         std::cout << other.node << ' ' << to_string(other.state) << '\n';
     }
     std::cout << speed;
-}
-
-void finding_by_seeds(asio::io_context& io) {
-    cles::service meeting_point{io, {.name = "base", .listen = {"tcp://127.0.0.1:0"}, .gossip = cles::gossip()}};
-    cles::service scout{io,
-                        {.name = "scout",
-                         .listen = {"tcp://127.0.0.1:0"},
-                         .gossip = cles::gossip({meeting_point.endpoints().front()})}};
 }
 
 asio::awaitable<void> errors(cles::service& car) {
@@ -169,9 +119,7 @@ asio::awaitable<void> errors(cles::service& car) {
     }
 }
 
-asio::awaitable<void> feeds(cles::service& car, position here) {
-    car.update("position", here); // to all subscribers; never blocks
-
+asio::awaitable<void> feeds(cles::service& car) {
     auto feed = co_await car.async_bind<position>("car0:position", cles::bind_options{}.every(100ms));
     for (;;) {
         const auto event = co_await feed.async_next();
@@ -181,35 +129,6 @@ asio::awaitable<void> feeds(cles::service& car, position here) {
             slow_down(event.text);
         }
     }
-}
-
-asio::awaitable<void> batches(cles::service& car) {
-    auto positions = co_await car.async_bind<position>("car0:position", cles::bind_options{}.keep(1024));
-    for (;;) {
-        for (const auto& event : co_await positions.async_next_batch()) { // <cles/feed_batch.hpp>
-            if (event.has_value()) {
-                record(event.value);
-            }
-        }
-    }
-}
-
-void follow_all(cles::feed<position>& positions) {
-    positions.async_next_batch([&](boost::system::error_code code, std::span<const cles::feed_item<position>> events) {
-        for (const auto& event : events) {
-            record(event.value);
-        }
-        if (!code) {
-            follow_all(positions);
-        }
-    });
-}
-
-asio::awaitable<void> feeds_of_all(cles::service& car) {
-    auto all = co_await car.async_bind<position>("all:position");
-    auto one = co_await car.async_bind<position>("car0:position", cles::bind_options{}.multicast());
-    const auto event = co_await all.async_next();
-    std::cout << event.publisher << " is at " << event.value.lat << '\n';
 }
 
 void a_hub(asio::io_context& io) {

@@ -272,7 +272,7 @@ struct bind_coroutine {
 /// executor: they are dispatched to the service's executor, and their handlers are called on their own.
 ///
 /// Lifetime. Operations and feeds may outlive the service: when it is destroyed, they fail with `stopped`. A child
-/// process that ends after `fork` leaves the service of its parent as it is (docs/library.md).
+/// process that ends after `fork` leaves the service of its parent as it is (docs/library_reference.md).
 ///
 /// Thread pools. For a `thread_pool`, the service makes a strand itself. Then operations may be started on any thread.
 /// The other functions may be called on any thread too: they run on the strand and block until done (on the pool's own

@@ -14,8 +14,8 @@
 #include <type_traits>
 #include <utility>
 
-/// Tasks that tell their types (docs/library.md, "Types"). Only programs that include this header compile and link what
-/// it needs.
+/// Tasks that tell their types (docs/library_reference.md, "Types that are told"). Only programs that include this
+/// header compile and link what it needs.
 
 namespace cles {
 
