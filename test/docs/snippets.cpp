@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 // The code blocks of the pages, in one file that is compiled. test/docs/code_in_docs.py looks for each of them here and
 // in the examples.
-#include <cles/job_feed.hpp>
 #include <cles/security.hpp>
 #include <cles/service.hpp>
 #include <cles/setting_error.hpp>
@@ -168,34 +167,3 @@ struct settings {
 };
 
 } // namespace checked
-
-namespace watching {
-
-struct warning {
-    double speed = 0;
-};
-BOOST_DESCRIBE_STRUCT(warning, (), (speed))
-
-// Reports the speeds of car0 that are too high, for as long as the requester waits.
-void watch(const cles::responder& job, const cles::job_feed& speeds, double limit) {
-    speeds.next([job, speeds, limit](boost::system::error_code code, const cles::job_event& event) {
-        if (code) { // car0 refuses the binding, or nobody waits for the job any more
-            job.fail(cles::errc::unavailable, event.text);
-            return;
-        }
-        if (event.kind == cles::feed_event::gap) {
-            job.log(cles::log_level::warning, std::to_string(event.missed) + " speeds were missed");
-        } else if (event.has_value() && event.as<double>() > limit) {
-            job.progress(0, warning{event.as<double>()});
-        }
-        watch(job, speeds, limit);
-    });
-}
-
-void register_watch(cles::registrar& to) {
-    to.on_delegate("watch", [](const cles::request& asked, const cles::responder& job) {
-        watch(job, job.bind("car0:speed", cles::bind_options{}.keep(8)), asked.as<double>());
-    });
-}
-
-} // namespace watching
