@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""How both ends of a `tls` link learn that they are members of one fleet (docs/security.md, "Streams"). No I/O."""
+"""How both ends of a `tls` link learn that they are members of one fleet (docs/protocol_security.md, "Streams"). No I/O."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSL-1.0
-"""In a secured fleet: which updates that another node passes on are believed (docs/security.md, "Rights", "Announcements")."""
+"""Which updates that another node of a secured fleet passes on are believed (docs/protocol_security.md, "Signed updates",
+"Confirmed epochs")."""
 
 from __future__ import annotations
 

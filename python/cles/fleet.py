@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""The key directory of a member of a fleet, its roster, and who may do what (docs/security.md)."""
+"""The key directory of a member of a fleet, its roster, and who may do what (docs/protocol_security.md)."""
 
 from __future__ import annotations
 

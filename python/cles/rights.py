@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Rights and local rules of a fleet's members (docs/security.md, "Rights")."""
+"""Rights and local rules of a fleet's members (docs/protocol_security.md, "Rights"; docs/security.md, "Local rules")."""
 
 from __future__ import annotations
 

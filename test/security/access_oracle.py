@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Who may request what, by docs/security.md ("Rights"): written from that page alone, with regular expressions."""
+"""Who may request what, by docs/protocol_security.md ("Rights") and docs/security.md ("Local rules"): written from these
+alone, with regular expressions."""
 
 from __future__ import annotations
 

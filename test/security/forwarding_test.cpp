@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What a node forwards in a fleet, and what others accept from it (docs/security.md, "Forwarded requests").
+// What a node forwards in a fleet, and what others accept from it (docs/protocol_security.md, "Forwarded requests").
 #include <cles/gossip.hpp>
 #include <cles/routing.hpp>
 

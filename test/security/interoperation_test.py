@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Files of docs/security.md that the library writes are read by the reference implementation, and the other way round.
+"""Files of docs/protocol_security.md that the library writes are read by the reference implementation, and the other way round.
 
     interoperation_test.py PROGRAM [unittest options]       PROGRAM is cles_security_files
 """

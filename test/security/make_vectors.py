@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Writes vectors.json: values of every format of docs/security.md, made from fixed keys, for other implementations.
+"""Writes vectors.json: values of every format of docs/protocol_security.md, made from fixed keys, for other implementations.
 
     make_vectors.py         prints the vectors
     make_vectors.py --add   prints those of vectors.json, and those that are not in it yet

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""The formats of docs/security.md, written from that page alone, with PyNaCl for the primitives."""
+"""The formats of docs/protocol_security.md, written from that page alone, with PyNaCl for the primitives."""
 
 from __future__ import annotations
 

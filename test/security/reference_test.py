@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""The formats of docs/security.md: the test vectors hold, and everything that the page refuses is refused.
+"""The formats of docs/protocol_security.md: the test vectors hold, and everything that the page refuses is refused.
 
     reference_test.py [unittest options]
 """

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// A fleet without multicast: its nodes know each other by gossip over `tls` only (docs/security.md, "Announcements").
+// A fleet without multicast: its nodes know each other by gossip over `tls` only (docs/protocol_security.md,
+// "Announcements").
 #include <cles/gossip.hpp>
 #include <cles/routing.hpp>
 

@@ -31,10 +31,10 @@ class call_options {
     call_options& hops(std::uint32_t most);
     /// The member of the fleet for which this node sends the request, if that is another one: the member's rights
     /// count, and this node needs the right to forward for it, as a node that forwards a client's request does
-    /// (docs/security.md, "Forwarded requests"). The way is the same too: other targets than this node itself need
-    /// `cles::routing()`, the node counts in `hops`, and what demands the requester's signature is `denied`. So is any
-    /// request without security, and of the reserved task all but PULL, because the others concern a link, which all
-    /// members share here. Not together with `at`; of bindings, not by multicast.
+    /// (docs/protocol_security.md, "Forwarded requests"). The way is the same too: other targets than this node itself
+    /// need `cles::routing()`, the node counts in `hops`, and what demands the requester's signature is `denied`. So is
+    /// any request without security, and of the reserved task all but PULL, because the others concern a link, which
+    /// all members share here. Not together with `at`; of bindings, not by multicast.
     call_options& on_behalf_of(std::string_view member);
     /// Makes the request part of a trace: "00-<32 hex digits>-<16 hex digits>-<2 hex digits>" (W3C `traceparent`), such
     /// as `request::trace()` of the request that causes this one. Text of another form is refused. Not for bindings.

@@ -21,8 +21,8 @@
 namespace cles::bridging {
 
 /// Between the bridge of a secured fleet and NATS: seals what is published, opens what is received, and asks senders
-/// that are not known whether they are alive (docs/security.md, "Through NATS"). What is for one bridge waits until a
-/// session with it has begun, if that bridge has sessions. One for each connection. Sans-I/O.
+/// that are not known whether they are alive (docs/protocol_security.md, "Through NATS"). What is for one bridge waits
+/// until a session with it has begun, if that bridge has sessions. One for each connection. Sans-I/O.
 class sealed_channel {
   public:
     /// How long messages wait, and how many bytes of them.

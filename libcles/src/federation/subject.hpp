@@ -44,7 +44,7 @@ std::string heartbeat_subject(const bridge_id& of);
 std::string names_subject(const bridge_id& of);
 std::string control_subject(const bridge_id& of);
 std::string reply_subject(const bridge_id& of, std::uint64_t number);
-/// Questions of sealed bridges to each other (docs/security.md, "Through NATS").
+/// Questions of sealed bridges to each other (docs/protocol_security.md, "Through NATS").
 std::string question_subject(const bridge_id& of);
 /// All messages for one bridge: its requests, replies, control, questions.
 std::string inbox_filter(const bridge_id& of);

@@ -30,7 +30,7 @@ class outbound;
 class reply_writer;
 struct node_state;
 
-/// What a subscriber may do with an update (docs/security.md, "Signed updates").
+/// What a subscriber may do with an update (docs/protocol_security.md, "Signed updates").
 enum class update_check : std::uint8_t {
     unsigned_one, ///< it need not be signed
     signed_one,   ///< its publisher has signed it
@@ -67,8 +67,8 @@ class link_security {
     virtual void send_hello() = 0;
 };
 
-/// What a secured node says, checks and signs besides the plain protocol (docs/security.md). Programs that do not call
-/// `cles::secured` do not link it: the node reaches it only through this interface.
+/// What a secured node says, checks and signs besides the plain protocol (docs/protocol_security.md). Programs that do
+/// not call `cles::secured` do not link it: the node reaches it only through this interface.
 class security_protocol {
   public:
     security_protocol() = default;

@@ -12,8 +12,8 @@
 
 namespace cles::core {
 
-/// Seals the messages of a bridge on their way through NATS, and opens those of other bridges (docs/security.md,
-/// "Through NATS"). One for each connection to NATS: each has a salt of its own. Sans-I/O.
+/// Seals the messages of a bridge on their way through NATS, and opens those of other bridges
+/// (docs/protocol_security.md, "Through NATS"). One for each connection to NATS: each has a salt of its own. Sans-I/O.
 class message_seal {
   public:
     message_seal() = default;

@@ -44,8 +44,8 @@ class security_observer {
     ~security_observer() = default;
 };
 
-/// What a secured node asks of its environment about its fleet (docs/security.md): who is a member, what members may
-/// do, and the roster. Nodes without security have none, so that they do not contain the code.
+/// What a secured node asks of its environment about its fleet (docs/protocol_security.md): who is a member, what
+/// members may do, and the roster. Nodes without security have none, so that they do not contain the code.
 ///
 /// Names are those of members. The functions are called on the node's executor.
 class node_security {

@@ -6,7 +6,8 @@
 
 namespace cles::core {
 
-/// Whose a request is, in a secured fleet (docs/security.md, "Forwarded requests"). Without security, both are empty.
+/// Whose a request is, in a secured fleet (docs/protocol_security.md, "Forwarded requests"). Without security, both are
+/// empty.
 struct request_origin {
     std::string_view requester{}; ///< the member whose rights apply; empty: nobody, who may do nothing
     std::string_view forwarder{}; ///< the member that has sent it in the requester's name; empty: the requester itself

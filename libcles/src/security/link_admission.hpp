@@ -38,8 +38,8 @@ struct admission_terms {
 };
 
 /// What both ends of a new link exchange before any other line, once each has proved that it has its key
-/// (docs/security.md, "Streams"): hello, the newer roster, welcome. Decides whether the other end is a member, and
-/// which. Sans-I/O.
+/// (docs/protocol_security.md, "Streams"): hello, the newer roster, welcome. Decides whether the other end is a member,
+/// and which. Sans-I/O.
 class link_admission {
   public:
     enum class verdict : std::uint8_t { pending, admitted, refused };

@@ -13,7 +13,7 @@
 
 namespace cles::tls {
 
-/// Seals the datagrams of one UDP socket for the sessions of its node (docs/security.md, "Between two nodes").
+/// Seals the datagrams of one UDP socket for the sessions of its node (docs/protocol_security.md, "Between two nodes").
 class udp_codec final : public transport::datagram_codec, private security::datagram_socket {
   public:
     /// The fleet is that of the datagrams.
@@ -51,8 +51,8 @@ class udp_codec final : public transport::datagram_codec, private security::data
     std::uint32_t number_ = 0;
 };
 
-/// `udp://host:port` for one node with security (docs/security.md, "Datagrams"): each link is to one member, in
-/// sessions. A link can only be dialled to a member that is named.
+/// `udp://host:port` for one node with security (docs/protocol_security.md, "Datagrams"): each link is to one member,
+/// in sessions. A link can only be dialled to a member that is named.
 std::unique_ptr<link_transport> make_sealed_udp(std::shared_ptr<security::fleet> fleet,
                                                 std::shared_ptr<security::sealed_datagrams> all);
 

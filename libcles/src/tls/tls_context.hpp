@@ -9,8 +9,9 @@ struct ssl_ctx_st;
 
 namespace cles::tls {
 
-/// What all TLS connections of a node share (docs/security.md, "Streams"): its self-signed certificate, made from its
-/// key, and what is negotiated: TLS 1.3, X25519, Ed25519 at both ends, `cles/1`, and no resumption of any kind.
+/// What all TLS connections of a node share (docs/protocol_security.md, "Streams"): its self-signed certificate, made
+/// from its key, and what is negotiated: TLS 1.3, X25519, Ed25519 at both ends, `cles/1`, and no resumption of any
+/// kind.
 class tls_context {
   public:
     /// \throws security::security_error if OpenSSL refuses

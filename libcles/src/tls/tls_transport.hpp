@@ -26,9 +26,9 @@ struct tls_options {
     security::admission_terms::handshake_turns::bounds handshakes = security::admission_terms::usual_handshakes;
 };
 
-/// `tls://host:port` for one node (docs/security.md, "Streams"). The peer of a link is the member that its key belongs
-/// to, and the link ends when the roster no longer has that member, or this node.
-/// \throws security::security_error if OpenSSL refuses the key
+/// `tls://host:port` for one node (docs/protocol_security.md, "Streams"). The peer of a link is the member that its key
+/// belongs to, and the link ends when the roster no longer has that member, or this node. \throws
+/// security::security_error if OpenSSL refuses the key
 std::unique_ptr<link_transport> make_tls_transport(tls_options options);
 
 } // namespace cles::tls

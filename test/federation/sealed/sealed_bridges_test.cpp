@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Bridges of a secured fleet (docs/security.md, "Through NATS").
+// Bridges of a secured fleet (docs/protocol_security.md, "Through NATS").
 #include "federation/bridge.hpp"
 #include "federation/heartbeat.hpp"
 #include "federation/sealed/sealed_site.hpp"

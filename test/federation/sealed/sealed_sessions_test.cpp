@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Sessions of bridges (docs/security.md, "Sessions of bridges").
+// Sessions of bridges (docs/protocol_security.md, "Sessions of bridges").
 #include "federation/bridge.hpp"
 #include "federation/sealed/sealed_site.hpp"
 

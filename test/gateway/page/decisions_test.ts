@@ -333,7 +333,7 @@ test("a trace begins with digits that others accept", () => {
 
 // --- Rights --------------------------------------------------------------------------------------------------------------
 
-test("rights permit what docs/security.md says", () => {
+test("rights permit what docs/protocol_security.md says", () => {
     const cases: [string, string, string, string, boolean][] = [
         ["pull,bind *:localization", "bind", "car1", "localization", true], ["pull,bind *:localization", "push", "car1", "localization", false],
         ["* car2:*/**", "push", "car2", "a/b/c", true], ["* car2:*/**", "push", "car1", "a", false], ["delegate sat1:plan/**", "delegate", "sat1", "plan", true],

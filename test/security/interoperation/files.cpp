@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Writes files of docs/security.md, or reads those of another implementation, for interoperation_test.py:
+// Writes files of docs/protocol_security.md, or reads those of another implementation, for interoperation_test.py:
 //
 //   cles_security_files write FOLDER     a fleet: fleet.key, roster, and a folder for each of two nodes
 //   cles_security_files read FOLDER      prints what a node's files contain, as JSON

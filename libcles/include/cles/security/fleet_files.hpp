@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-/// The directory of a fleet's authority: the fleet's key and the newest roster (docs/security.md, "The roster"). Each
-/// change makes a roster of the next version.
+/// The directory of a fleet's authority: the fleet's key and the newest roster (docs/protocol_security.md, "The
+/// roster"). Each change makes a roster of the next version.
 ///
 /// All functions throw `std::runtime_error` with a message for people. If they do, nothing has changed, unless several
 /// files are written and only some of them could be. None returns a secret.

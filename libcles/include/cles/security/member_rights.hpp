@@ -8,7 +8,7 @@
 
 namespace cles::security {
 
-/// What a member of a fleet is permitted, as its entry in the roster lists it (docs/security.md, "Rights").
+/// What a member of a fleet is permitted, as its entry in the roster lists it (docs/protocol_security.md, "Rights").
 struct member_rights {
     std::optional<std::vector<std::string>> may{};    ///< what it may request; none: everything
     std::optional<std::vector<std::string>> offers{}; ///< what others may request of it; none: everything

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-/// The directory of a node: its key, the roster, and its local rules (docs/security.md, "The roster"). For programs
-/// that create and show keys; a node itself reads more.
+/// The directory of a node: its key, the roster, and its local rules (docs/protocol_security.md, "The roster"). For
+/// programs that create and show keys; a node itself reads more.
 ///
 /// All functions throw `std::runtime_error` with a message for people, which names the file, what is wrong, and what
 /// corrects it. None returns a secret.

@@ -79,7 +79,7 @@ void write_routes(json_writer& w, const table_owner& who, std::string_view pool,
 /// How the entries of tables are written.
 enum class entry_form : std::uint8_t {
     plain,
-    signed_by_node, ///< with the announcement as it was signed (docs/security.md, "Announcements")
+    signed_by_node, ///< with the announcement as it was signed (docs/protocol_security.md, "Announcements")
 };
 
 /// Reads a reply, or a table sent without a request; the entries beyond `max_entries` are skipped. `usual`: the

@@ -9,8 +9,8 @@
 #include <string>
 #include <string_view>
 
-/// Confirmed epochs (docs/security.md, "Announcements"): an epoch counts only if its node has confirmed it, so that a
-/// repeated update of an earlier incarnation is no restart.
+/// Confirmed epochs (docs/protocol_security.md, "Announcements"): an epoch counts only if its node has confirmed it, so
+/// that a repeated update of an earlier incarnation is no restart.
 
 namespace cles::core {
 

@@ -18,9 +18,9 @@ namespace cles::core {
 
 struct node_state;
 
-/// The challenges that this node has given to requesters of signed tasks (docs/security.md, "Signed requests"). Each is
-/// valid once, for the same request, until its first attempt's deadline, but no longer than requests of its verb
-/// usually wait, or until the end of the link on which it was given.
+/// The challenges that this node has given to requesters of signed tasks (docs/protocol_security.md, "Signed
+/// requests"). Each is valid once, for the same request, until its first attempt's deadline, but no longer than
+/// requests of its verb usually wait, or until the end of the link on which it was given.
 class request_challenges {
   public:
     /// Beyond these, the oldest one is forgotten.

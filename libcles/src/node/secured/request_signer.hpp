@@ -14,8 +14,8 @@ namespace cles::core {
 
 class local_node;
 
-/// Signs the requests of this node that need it (docs/security.md, "Signed requests"): when a node has answered the
-/// first attempt with a challenge, the request is sent to that node once more, with the signature.
+/// Signs the requests of this node that need it (docs/protocol_security.md, "Signed requests"): when a node has
+/// answered the first attempt with a challenge, the request is sent to that node once more, with the signature.
 class request_signer : public std::enable_shared_from_this<request_signer> {
   public:
     explicit request_signer(local_node& host) noexcept : host_(host) {}

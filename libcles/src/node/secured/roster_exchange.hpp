@@ -13,8 +13,8 @@
 #include <string>
 #include <string_view>
 
-/// How rosters spread (docs/security.md, "The roster"): nodes state the version that they have, and those with an older
-/// one ask for it.
+/// How rosters spread (docs/protocol_security.md, "The roster"): nodes state the version that they have, and those with
+/// an older one ask for it.
 
 namespace cles::core {
 

@@ -37,9 +37,9 @@ struct access_decision {
     [[nodiscard]] bool allowed() const noexcept { return by == cause::permitted || by == cause::exempt; }
 };
 
-/// Who may request what of whom, by the rights in a roster and by the local rules of one node (docs/security.md,
-/// "Rights"). Immutable: made anew when either changes. A decision allocates nothing, and is valid as long as the
-/// policy.
+/// Who may request what of whom, by the rights in a roster and by the local rules of one node
+/// (docs/protocol_security.md, "Rights"). Immutable: made anew when either changes. A decision allocates nothing, and
+/// is valid as long as the policy.
 ///
 /// The target of each noun is the node that serves: this one, the one to which a request is forwarded or sent, or the
 /// publisher. A `forwarder` is the node that states the requester, or that would; empty for none.

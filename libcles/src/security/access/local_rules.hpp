@@ -12,8 +12,8 @@
 
 namespace cles::security {
 
-/// The file `rules` of a node's directory, which narrows what the roster permits (docs/security.md, "Rights"): one rule
-/// per line. Empty lines are ignored, as is what follows `#`; words are separated by spaces or tabs.
+/// The file `rules` of a node's directory, which narrows what the roster permits (docs/security.md, "Local rules"): one
+/// rule per line. Empty lines are ignored, as is what follows `#`; words are separated by spaces or tabs.
 class local_rules {
   public:
     static constexpr std::size_t max_size = 65'536;

@@ -44,7 +44,7 @@ class decoded_noun {
     std::string decoded_;
 };
 
-/// One right, `VERBS NOUN` (docs/security.md, "Rights").
+/// One right, `VERBS NOUN` (docs/protocol_security.md, "Rights").
 class right {
   public:
     /// Nothing if it is of another form; then `why` says what is wrong.

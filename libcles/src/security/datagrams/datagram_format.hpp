@@ -9,7 +9,7 @@
 #include <optional>
 #include <span>
 
-/// The layout of sealed datagrams (docs/security.md, "Datagrams").
+/// The layout of sealed datagrams (docs/protocol_security.md, "Datagrams").
 
 namespace cles::security {
 

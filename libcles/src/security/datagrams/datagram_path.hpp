@@ -46,7 +46,7 @@ struct datagram_path {
     static constexpr std::uint64_t v4_prefix = 0xffff00000000;
 };
 
-/// A source of datagrams (docs/security.md, "Datagrams"): where they come from, and which member sends them.
+/// A source of datagrams (docs/protocol_security.md, "Datagrams"): where they come from, and which member sends them.
 struct datagram_source {
     datagram_path path{};
     std::uint32_t member = 0; ///< its number

@@ -63,7 +63,8 @@ class datagram_sink {
     ~datagram_sink() = default;
 };
 
-/// The sessions of one node with others, over datagrams between two addresses (docs/security.md, "Between two nodes").
+/// The sessions of one node with others, over datagrams between two addresses (docs/protocol_security.md, "Between two
+/// nodes").
 ///
 /// Sans-I/O. The owner passes in what arrives, calls `on_time` at `next_deadline`, and sends what it is given. While a
 /// session is in use, `send` and `receive` allocate nothing. When the roster in force changes, the sessions with

@@ -22,8 +22,8 @@ namespace cles::security {
 
 class group_sender;
 
-/// Opens what arrives from the multicast group (docs/security.md, "In the multicast group"). Sans-I/O; allocates
-/// nothing while no salt is new.
+/// Opens what arrives from the multicast group (docs/protocol_security.md, "In the multicast group"). Sans-I/O;
+/// allocates nothing while no salt is new.
 ///
 /// A line is received in two steps, because its counter is noted only when the source has been checked too: `open`,
 /// then the checks of the node, then `accept`.

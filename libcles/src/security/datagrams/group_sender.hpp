@@ -12,8 +12,8 @@
 
 namespace cles::security {
 
-/// Seals what a node sends to the multicast group (docs/security.md, "In the multicast group"). No nonce is used twice:
-/// the salt is random, new in each process and at the end of the counter.
+/// Seals what a node sends to the multicast group (docs/protocol_security.md, "In the multicast group"). No nonce is
+/// used twice: the salt is random, new in each process and at the end of the counter.
 class group_sender {
   public:
     group_sender(const fleet& of, entropy& random, std::uint64_t first_counter = 0);

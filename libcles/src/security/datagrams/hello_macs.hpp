@@ -11,8 +11,8 @@
 
 namespace cles::security {
 
-/// The MAC at the end of HELLO (docs/security.md, "Between two nodes"). It shows at the cost of a hash that a member
-/// has made this HELLO, but not when: anybody can repeat it.
+/// The MAC at the end of HELLO (docs/protocol_security.md, "Between two nodes"). It shows at the cost of a hash that a
+/// member has made this HELLO, but not when: anybody can repeat it.
 class hello_macs {
   public:
     explicit hello_macs(const fleet& of) noexcept : fleet_(of) {}

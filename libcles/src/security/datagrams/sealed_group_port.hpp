@@ -17,10 +17,10 @@
 
 namespace cles::security {
 
-/// A node's endpoint in the multicast group of a secured fleet (docs/security.md, "In the multicast group"): seals what
-/// it sends by another port, and delivers what it can open, with the sender. A sender of which it does not know the
-/// salt is contacted, and then asked to announce itself. A member that has an old roster gets the last announcement of
-/// this node in a session, since it can open none in the group.
+/// A node's endpoint in the multicast group of a secured fleet (docs/protocol_security.md, "In the multicast group"):
+/// seals what it sends by another port, and delivers what it can open, with the sender. A sender of which it does not
+/// know the salt is contacted, and then asked to announce itself. A member that has an old roster gets the last
+/// announcement of this node in a session, since it can open none in the group.
 class sealed_group_port final : public core::group_port, private core::group_listener, private datagram_socket {
   public:
     /// A member did not answer, or has a newer roster; the endpoints are those that it has announced last, with the

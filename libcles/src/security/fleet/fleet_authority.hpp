@@ -12,8 +12,8 @@
 
 namespace cles::security {
 
-/// Makes the rosters of a fleet, each of the next version (docs/security.md, "The roster"). It needs the fleet's key
-/// and the newest roster only. Sans-I/O: the owner stores `newest`.
+/// Makes the rosters of a fleet, each of the next version (docs/protocol_security.md, "The roster"). It needs the
+/// fleet's key and the newest roster only. Sans-I/O: the owner stores `newest`.
 ///
 /// If a function throws, the newest roster is as before.
 class fleet_authority {

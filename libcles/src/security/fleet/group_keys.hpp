@@ -15,7 +15,7 @@ class roster;
 
 inline constexpr std::size_t group_key_size = 32;
 
-/// The group keys of a roster (docs/security.md, "Group keys").
+/// The group keys of a roster (docs/protocol_security.md, "Group keys").
 struct group_keys {
     secret_bytes current{}; ///< of `roster::generation`
     secret_bytes next{};    ///< of the next one
@@ -33,7 +33,7 @@ bool is_sealed_group_keys(std::string_view text);
 group_keys open_group_keys(std::string_view sealed, const signing_key& receiver);
 
 /// The group keys that a node has: those of the roster in force, and the previous one where the roster permits it
-/// (docs/security.md, "Group keys").
+/// (docs/protocol_security.md, "Group keys").
 class group_key_ring {
   public:
     /// Adds the keys of a newer roster, and forgets those of other generations, except the previous one if it is

@@ -18,7 +18,7 @@ struct node_credentials {
     std::vector<std::string> warnings{};  ///< to be logged: rosters that are not in force although they are as new
 };
 
-/// The directory of a node, or of the authority, with the files of docs/security.md, "The roster".
+/// The directory of a node, or of the authority, with the files of docs/protocol_security.md, "The roster".
 ///
 /// All functions throw `security_error`, which names the file, what is wrong, and what mends it.
 class key_directory {

@@ -36,7 +36,7 @@ struct member : member_rights {
     }
 };
 
-/// A roster (docs/security.md, "The roster"): the members of a fleet, signed by the fleet's key. Immutable.
+/// A roster (docs/protocol_security.md, "The roster"): the members of a fleet, signed by the fleet's key. Immutable.
 class roster {
   public:
     /// Reads a roster line, after it has verified the signature.

@@ -6,8 +6,8 @@
 #include <string>
 #include <string_view>
 
-/// Whose a key is, and the lines of key files (docs/security.md, "The roster"). Each line has exactly one form; readers
-/// accept an LF after it.
+/// Whose a key is, and the lines of key files (docs/protocol_security.md, "The roster"). Each line has exactly one
+/// form; readers accept an LF after it.
 
 namespace cles::security {
 

@@ -16,7 +16,7 @@
 
 namespace cles::security {
 
-/// Something that docs/security.md refuses. The message is for people and names what is wrong.
+/// Something that docs/protocol_security.md refuses. The message is for people and names what is wrong.
 class security_error : public std::runtime_error {
   public:
     using std::runtime_error::runtime_error;

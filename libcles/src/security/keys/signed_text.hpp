@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-/// What members sign: requests, updates and announcements (docs/security.md, "Signatures of members").
+/// What members sign: requests, updates and announcements (docs/protocol_security.md, "Signatures of members").
 
 namespace cles::security {
 

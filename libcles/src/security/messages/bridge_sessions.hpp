@@ -28,9 +28,9 @@ struct session_head {
     std::uint64_t counter = 0;
 };
 
-/// The sessions of a bridge with others (docs/security.md, "Through NATS"). Each carries messages in one direction: a
-/// bridge sends in the session that it has begun. So both ends may begin one at any time, and neither has to know which
-/// of several the other one uses.
+/// The sessions of a bridge with others (docs/protocol_security.md, "Through NATS"). Each carries messages in one
+/// direction: a bridge sends in the session that it has begun. So both ends may begin one at any time, and neither has
+/// to know which of several the other one uses.
 ///
 /// HELLO and WELCOME travel in signed messages, which count once, and only if their sender is proved to be alive:
 /// nobody else can make one, and copies have no effect. Bridges are known by their instance, whose first 24 bits are

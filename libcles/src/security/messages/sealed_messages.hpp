@@ -23,8 +23,8 @@
 
 namespace cles::security {
 
-/// Seals and opens messages with the keys of a fleet (docs/security.md, "Through NATS"). Allocates only the message
-/// that `seal` returns, and what questions need.
+/// Seals and opens messages with the keys of a fleet (docs/protocol_security.md, "Through NATS"). Allocates only the
+/// message that `seal` returns, and what questions need.
 class sealed_messages final : public core::message_seal {
   public:
     /// Takes the line of a roster from another bridge. What is in force may change during the call.

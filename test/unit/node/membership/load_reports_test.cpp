@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// The load that members of a secured fleet report in the group between signed announcements (docs/security.md,
+// The load that members of a secured fleet report in the group between signed announcements (docs/protocol_security.md,
 // "Announcements").
 #include "node/membership/membership.hpp"
 #include "support/watched_membership.hpp"

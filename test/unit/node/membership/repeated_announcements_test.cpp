@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Announcements that others have repeated (docs/protocol.md, "Name ownership"; docs/security.md, "Announcements").
+// Announcements that others have repeated (docs/protocol.md, "Name ownership"; docs/protocol_security.md,
+// "Announcements").
 #include "node/membership/membership.hpp"
 #include "support/watched_membership.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Gossip in a secured fleet (docs/security.md, "Announcements").
+// Gossip in a secured fleet (docs/protocol_security.md, "Announcements").
 #include "node/membership/gossip.hpp"
 #include "protocol/request_line.hpp"
 #include "support/manual_clock.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Forwarded updates in a secured fleet (docs/security.md, "Announcements"). car2 forwards those of car3, which has not
-// announced itself here.
+// Forwarded updates in a secured fleet (docs/protocol_security.md, "Announcements"). car2 forwards those of car3, which
+// has not announced itself here.
 #include <cles/error.hpp>
 
 #include "node/secured/unconfirmed_updates.hpp"
