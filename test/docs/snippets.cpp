@@ -74,13 +74,6 @@ void an_open_service() {
     cles::service fast{io, {.name = "car2", .listen = {"udp://127.0.0.1:0"}, .networks = {"10.0.0.0/8", "fd00::/8"}}};
 }
 
-void a_service_in_a_group() {
-    cles::service_options in_group{.name = "car3"};
-    in_group.multicast.interface = "lo"; // "eth0", "lo,eth0" and "auto" need `insecure`, as listening there does
-    asio::io_context io;
-    const cles::service car{io, in_group};
-}
-
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres) {
     car.on_pull("tyre", [&](const cles::request& asked) { return tyres.at(asked.parameter<std::size_t>(0)); });
     car.on_push("target", [&](const position& to) { target = to; });
