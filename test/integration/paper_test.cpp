@@ -12,6 +12,7 @@
 #include <cstdlib>
 #include <deque>
 #include <future>
+#include <memory>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -223,21 +224,22 @@ BOOST_FIXTURE_TEST_CASE(any_thread_may_request_and_register_while_it_runs, devic
 }
 
 BOOST_FIXTURE_TEST_CASE(stop_ends_requests_that_wait_and_the_service_for_good, devices) {
-    std::promise<void> begun;
-    std::promise<void> over;
-    device1.registerDelegateFunction("long", [&] {
-        begun.set_value();
-        over.get_future().wait_for(cles::test::patience);
+    // Shared, because the function may use them longer than this test.
+    const auto begun = std::make_shared<std::promise<void>>();
+    const auto over = std::make_shared<std::promise<void>>();
+    device1.registerDelegateFunction("long", [begun, over] {
+        begun->set_value();
+        over->get_future().wait_for(cles::test::patience);
     });
     run();
     auto waits = std::async(std::launch::async, [&] { return ask("DELEGATE device1:long"); });
-    begun.get_future().wait();
+    begun->get_future().wait();
     device2.stop();
     BOOST_TEST(waits.get() == message_of(errc::stopped));
     device2.stop();
     BOOST_TEST(ask("PULL device1:long") == message_of(errc::stopped));
     BOOST_CHECK_THROW(device2.run(), cles::error);
-    over.set_value();
+    over->set_value();
 }
 
 BOOST_FIXTURE_TEST_CASE(several_threads_may_stop_it_at_the_same_time, devices) {
