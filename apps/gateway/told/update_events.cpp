@@ -101,14 +101,15 @@ void update_events::take(const cles::feed_item<cles::json_text>& item, std::stri
         take_value(item, out);
         return;
     }
-    const bool is_named = is_of_all_ && !item.publisher.empty();
-    const auto of = is_named ? R"(,"node":)" + json_string(item.publisher) : std::string{};
     switch (item.kind) {
     case cles::feed_event::current:
     case cles::feed_event::update: return; // values
-    case cles::feed_event::gap:
+    case cles::feed_event::gap: {
+        const bool is_named = is_of_all_ && !item.publisher.empty();
+        const auto of = is_named ? R"(,"node":)" + json_string(item.publisher) : std::string{};
         append_event(out, "gap", {}, R"({"missed":)" + std::to_string(item.missed) + of + "}");
         return;
+    }
     case cles::feed_event::lost: append_event(out, "lost", {}, R"({"reason":)" + json_string(item.text) + "}"); return;
     case cles::feed_event::rebound: append_event(out, "rebound", {}, "{}"); return;
     }
